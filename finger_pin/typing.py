@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import MutableSequence, Sequence
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
@@ -18,5 +18,7 @@ Number: TypeAlias = float | NDArray[np.floating[Any]]
 Numeric = TypeVar("Numeric", Array, Number)
 #: Numbers side by side: what a law returns, or its signals.
 Numbers: TypeAlias = tuple[Number, ...]
+#: Floats in memory, by index: an address to compiled code.
+Pointer: TypeAlias = MutableSequence[float]
 #: A law's parameters in the order of their names, each a number or one of every row.
 Parameters: TypeAlias = Sequence[Number] | Array

@@ -10,12 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from finger_pin.core.addresses.law_code import ROW
-from finger_pin.core.addresses.shape_code import GAP_OUT
 from finger_pin.core.jit import Indices, Matrix, Vector, njit_always_inline, njit_inline
 from finger_pin.core.tables.buffers import Work
 from finger_pin.core.tables.mechanism_parameters import Parameters
 from finger_pin.core.tables.path_tables import PIECE, PathParameters, PathWork
 from finger_pin.core.tables.structure import Structure
+from finger_pin.mechanism.gaps.signed_distance import GAP_OUT
 
 # Derivations and origins: core/stepping/NOTES.md.
 # Accuracy to which gaps are computed, m: `mechanism/gaps/nearest.py` flattens distances by as much (`INSIDE`).

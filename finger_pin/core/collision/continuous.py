@@ -15,7 +15,6 @@ from typing import TypeAlias
 import numpy as np
 
 from finger_pin.core.addresses.law_code import ROW
-from finger_pin.core.addresses.shape_code import GAP_OUT
 from finger_pin.core.collision.broad_phase import (
     GAP_ACCURACY,
     add_turning,
@@ -30,6 +29,7 @@ from finger_pin.core.tables.mechanism_parameters import Parameters
 from finger_pin.core.tables.model import Model
 from finger_pin.core.tables.path_tables import LOOK, MAX_LOOKS, PIECE, PathWork
 from finger_pin.core.tables.structure import Structure
+from finger_pin.mechanism.gaps.signed_distance import GAP_OUT
 
 # Bernstein coefficients of a coordinate over a step.
 _Coefficients: TypeAlias = tuple[float, float, float, float, float]
@@ -53,7 +53,7 @@ def _difference(pieces: PathWork, j: int, other: int, i: int) -> float:
 
 
 @njit_always_inline
-def _between(start: float, end: float, b: _Coefficients) -> _Coefficients:
+def _part(start: float, end: float, b: _Coefficients) -> _Coefficients:
     """Return the Bernstein coefficients of a part of a polynomial."""
     b0, b1, b2, b3, b4 = b
     s, c = end, 1.0 - end
@@ -87,7 +87,7 @@ def _bounds(
             _difference(pieces, j, other, 3),
             _difference(pieces, j, other, 4),
         )
-        b0, b1, b2, b3, b4 = _between(one[LOOK.share], two[LOOK.share], whole)
+        b0, b1, b2, b3, b4 = _part(one[LOOK.share], two[LOOK.share], whole)
         d0, d1, d2, d3 = b1 - b0, b2 - b1, b3 - b2, b4 - b3
         travel = abs(d0) + abs(d1) + abs(d2) + abs(d3)
         most = max(max(abs(d0), abs(d1)), max(abs(d2), abs(d3)))

@@ -6,7 +6,6 @@ The wrenches of a piece turn with the body that carries its frame, and change wi
 from __future__ import annotations
 
 from finger_pin.core.addresses.law_code import ROW
-from finger_pin.core.addresses.shape_code import GAP_OUT, SPAN_OUT
 from finger_pin.core.addresses.spatial import add_force_cross, dot, motion_cross
 from finger_pin.core.evaluation.blocks import partition
 from finger_pin.core.evaluation.paths import add_moment, angle_between, net_wrench, passes, turn_out
@@ -16,7 +15,8 @@ from finger_pin.core.tables.linear_systems import Linear
 from finger_pin.core.tables.model import MODEL
 from finger_pin.core.tables.path_tables import PIECE, WRENCH, PathParameters, PathStructure
 from finger_pin.core.tables.structure import Structure
-from finger_pin.mechanism.spans.span import COINCIDENT
+from finger_pin.mechanism.gaps.signed_distance import GAP_OUT, GAP_SLOPE, POINT, SLOPE_WIDTH
+from finger_pin.mechanism.spans.span import COINCIDENT, SPAN_OUT, SPAN_SLOPE
 
 
 @njit_always_inline
@@ -36,8 +36,8 @@ def _changed(slopes: Vector, first: int, dy: Vector, rotation: Matrix, out: Vect
         out[r] = 0.0
     for i in range(3):
         change = 0.0
-        for c in range(6):
-            change += slopes[first + 6 * i + c] * dy[c]
+        for c in range(SLOPE_WIDTH):
+            change += slopes[first + SLOPE_WIDTH * i + c] * dy[c]
         for r in range(3):
             out[r] += rotation[r, i] * change
 
@@ -61,29 +61,30 @@ def _slopes_of_piece(paths: PathStructure, geometry: PathParameters, e: int, wor
             # The slopes of a gap of three points are by the angular velocity.
             for c in range(3):
                 turning = rotation[0, c] * axis[0] + rotation[1, c] * axis[1] + rotation[2, c] * axis[2]
-                dy[3 + c] = (moves[0] - moves[PIECE.frame]) * turning
+                dy[POINT.second + c] = (moves[0] - moves[PIECE.frame]) * turning
         for m in range(columns):
             wrench, out = pieces.wrench[e, m], pieces.wrench_slope[s, m]
             for i in range(WRENCH):
                 out[i] = 0.0
             if columns == 1:
                 turn = 0.0
-                for c in range(6):
-                    turn += slopes[c] * dy[c]
+                for c in range(SLOPE_WIDTH):
+                    turn += slopes[SPAN_SLOPE.turn + c] * dy[c]
                 pieces.turn_slope[s] = turn
                 for p in range(2):
                     force = out[6 * p + 3 : 6 * p + 6]
-                    _changed(slopes, 6 + 18 * p, dy, rotation, force)
+                    _changed(slopes, SPAN_SLOPE.first_pull + 3 * SLOPE_WIDTH * p, dy, rotation, force)
                     add_moment(ends[3 * p : 3 * p + 3], force, out[6 * p : 6 * p + 3])
                     turn_out(rotation, dy, 3 * p, moved)
                     add_moment(moved, wrench[6 * p + 3 : 6 * p + 6], out[6 * p : 6 * p + 3])
             elif m > 2:
-                _changed(slopes, 0, dy, rotation, out[:3])
+                _changed(slopes, GAP_SLOPE.normal, dy, rotation, out[:3])
             else:
                 force = out[3:6]
-                _changed(slopes, 0 if m == 0 else 18 + 18 * m, dy, rotation, force)
+                first = GAP_SLOPE.normal if m == 0 else GAP_SLOPE.first_tangent + 3 * SLOPE_WIDTH * (m - 1)
+                _changed(slopes, first, dy, rotation, force)
                 add_moment(point, force, out[:3])
-                _changed(slopes, 18, dy, rotation, moved)
+                _changed(slopes, GAP_SLOPE.point, dy, rotation, moved)
                 add_moment(moved, wrench[3:6], out[:3])
             if moves[PIECE.frame]:
                 for p in range(2):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from finger_pin.core.addresses.law_code import ROW
-from finger_pin.core.addresses.shape_code import GAP_OUT, SPAN_OUT
 from finger_pin.core.addresses.spatial import dot
 from finger_pin.core.evaluation.rigid_body_dynamics import move
 from finger_pin.core.jit import (
@@ -23,7 +22,8 @@ from finger_pin.core.tables.mechanism_parameters import Parameters
 from finger_pin.core.tables.model import MODEL
 from finger_pin.core.tables.path_tables import PIECE, WRENCH, PathParameters, PathStructure
 from finger_pin.core.tables.structure import Structure
-from finger_pin.mechanism.spans.span import COINCIDENT
+from finger_pin.mechanism.gaps.signed_distance import GAP_OUT, POINT
+from finger_pin.mechanism.spans.span import COINCIDENT, SPAN_OUT
 
 
 @njit_inline
@@ -77,16 +77,16 @@ def _look(paths: PathStructure, geometry: PathParameters, e: int, work: Work) ->
     """Fill value and wrenches of a piece between placed bodies; return false if it is out of reach."""
     pieces = work.paths
     _frame(paths, geometry, e, work)
-    out, y = pieces.out[e], pieces.local_points[e]
+    out, points = pieces.out[e], pieces.local_points[e]
     beyond = 0.0
     for c in range(3):
-        middle = 0.5 * (y[c] + y[3 + c])
+        middle = 0.5 * (points[POINT.first + c] + points[POINT.second + c])
         beyond += middle * middle
     beyond = np.sqrt(beyond) - geometry.reach[e]
     if beyond > 0.0:
         out[GAP_OUT.gap] = beyond
     else:
-        call_shape(paths.value[e], y, geometry.shapes[e], out)
+        call_shape(paths.value[e], points, geometry.shapes[e], out)
     return not beyond > 0.0
 
 
@@ -106,7 +106,7 @@ def _measure(paths: PathStructure, geometry: PathParameters, e: int, work: Work)
     if columns == 1:
         wrench = pieces.wrench[e, 0]
         for p in range(2):
-            turn_out(rotation, out, SPAN_OUT.first_force + 3 * p, wrench[6 * p + 3 : 6 * p + 6])
+            turn_out(rotation, out, SPAN_OUT.first_pull + 3 * p, wrench[6 * p + 3 : 6 * p + 6])
             add_moment(ends[3 * p : 3 * p + 3], wrench[6 * p + 3 : 6 * p + 6], wrench[6 * p : 6 * p + 3])
     else:
         turn_out(rotation, out, GAP_OUT.point, point)
@@ -117,7 +117,7 @@ def _measure(paths: PathStructure, geometry: PathParameters, e: int, work: Work)
             turn_out(rotation, out, GAP_OUT.normal, pieces.wrench[e, m, :3])
         for m in range(3):
             wrench = pieces.wrench[e, m]
-            turn_out(rotation, out, GAP_OUT.normal if m == 0 else GAP_OUT.tangents + 3 * (m - 1), wrench[3:6])
+            turn_out(rotation, out, GAP_OUT.normal if m == 0 else GAP_OUT.first_tangent + 3 * (m - 1), wrench[3:6])
             add_moment(point, wrench[3:6], wrench[:3])
 
 

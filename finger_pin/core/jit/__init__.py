@@ -30,7 +30,8 @@ from finger_pin.core.jit.functions import (
     njit_reassociate,
 )
 from finger_pin.core.jit.struct_packing import Block, call, copied, empty_table, overwrite, pack, refuse_copy
-from finger_pin.core.jit.struct_types import IndexTable, Indices, Layers, Matrix, Pointer, StructType, Vector, unpack
+from finger_pin.core.jit.struct_types import IndexTable, Indices, Layers, Matrix, StructType, Vector, unpack
+from finger_pin.typing import Pointer
 
 __all__ = [
     "Block",

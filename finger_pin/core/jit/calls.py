@@ -56,9 +56,9 @@ def call_filling(address: int, rows: Matrix, parameters: Matrix, filled: Matrix,
 
 
 @njit_inline
-def call_shape(address: int, y: Vector, p: Vector, out: Vector) -> None:
+def call_shape(address: int, points: Vector, p: Vector, out: Vector) -> None:
     """Call the function of a shape at an address with three rows of numbers."""
-    _call(address, (y.ctypes.data, p.ctypes.data, out.ctypes.data))
+    _call(address, (points.ctypes.data, p.ctypes.data, out.ctypes.data))
 
 
 @_generated(prefer_literal=True)

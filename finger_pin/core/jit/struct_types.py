@@ -7,8 +7,8 @@ function for each field of each table, by which the core takes half as long agai
 
 from __future__ import annotations
 
-from collections.abc import Callable, MutableSequence, Sequence
-from typing import Annotated, Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar, get_type_hints
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any, Generic, NamedTuple, Protocol, TypeVar, get_type_hints
 
 import numpy as np
 from llvmlite import ir
@@ -34,8 +34,6 @@ Matrix = Annotated[Array, Numbers("float64", 2)]
 Layers = Annotated[Array, Numbers("float64", 3)]
 IndexTable = Annotated[NDArray[np.int64], Numbers("int64", 2)]
 Indices = Annotated[NDArray[np.int64], Numbers("int64", 1)]
-#: Floats in memory, by index: an address to compiled code.
-Pointer: TypeAlias = MutableSequence[float]
 
 _Table = TypeVar("_Table", bound=tuple[Any, ...])
 

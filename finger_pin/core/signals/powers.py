@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from finger_pin.core.collision.broad_phase import activate_all_pairs, activate_since, cull_distant
 from finger_pin.core.evaluation.attitude_charts import place_bodies
@@ -18,7 +18,7 @@ from finger_pin.core.jit import (
     unpack,
 )
 from finger_pin.core.signals.state_batches import exert_alone, fill_base_power, fill_energy_terms
-from finger_pin.core.steps.interpolation import Between, interpolate_within, step_at
+from finger_pin.core.steps.interpolation import Interpolation, interpolate_within, step_at
 from finger_pin.core.tables.buffers import Work
 from finger_pin.core.tables.mechanism_parameters import Parameters
 from finger_pin.core.tables.model import MODEL
@@ -26,17 +26,17 @@ from finger_pin.core.tables.structure import Structure
 
 
 class Powers(NamedTuple):
-    """The steps of an island, and their powers to be filled at the k times of their `Between`.
+    """The steps of an island, and their powers to be filled at the k times of their `Interpolation`.
 
     Attributes:
         model: Address of a bound `Model` with the island's inputs.
-        between: The steps, of which there must be one.
+        steps: The steps, of which there must be one.
         energy_terms: Scratch, energies and powers of the rows, shape (energies,).
         powers: Filled with the powers, and that of the forces at the tips, shape (k, powers + 1).
     """
 
     model: int
-    between: Between
+    steps: Interpolation
     energy_terms: Vector
     powers: Matrix
 
@@ -45,14 +45,14 @@ POWERS = StructType(Powers)
 
 
 @njit_inline
-def _attitude(b: Any, step: int) -> Any:
+def _attitude(steps: Interpolation, step: int) -> Matrix:
     """Return the reference quaternions of a step, from which angles are measured."""
-    return b.attitude if step == 0 else b.attitudes[step - 1]
+    return steps.attitude if step == 0 else steps.attitudes[step - 1]
 
 
 @njit_always_inline
 def _fill_powers(
-    structure: Structure, parameters: Parameters, work: Work, state: Vector, energy_terms: Any, out: Vector
+    structure: Structure, parameters: Parameters, work: Work, state: Vector, energy_terms: Vector, out: Vector
 ) -> None:
     """Fill the powers of the rows and of the forces at the tips."""
     count, width = out.size - 1, work.torque.size
@@ -68,23 +68,24 @@ def _fill_powers(
 def power_many(address: int, _time: float) -> int:
     """Fill the `Powers` at an address."""
     powers = unpack(address, POWERS)
-    b, model = powers.between, unpack(powers.model, MODEL)
+    steps, model = powers.steps, unpack(powers.model, MODEL)
     structure, parameters, work, state = model.structure, model.parameters, model.work, model.state
     width, step, last = work.torque.size, -1, -1
     moving = model.base_power != 0 or work.guide.size > 0
     activate_all_pairs(structure, work)
-    for k in range(b.times.size):
-        time, last = b.times[k], step
-        step = step_at(b, time, step)
-        interpolate_within(b, step, time, state)
+    for k in range(steps.times.size):
+        time, last = steps.times[k], step
+        step = step_at(steps, time, step)
+        interpolate_within(steps, step, time, state)
         if step != last:
-            place_bodies(structure, parameters, _attitude(b, step))
+            place_bodies(structure, parameters, _attitude(steps, step))
         if moving:
             call_at(model.evaluate, powers.model, time)
         else:
             # Contacts far apart are culled from state to state; what is left in ``rate`` is the state before.
             if structure.contact_rows > 0 and k > 0:
-                activate_since(structure, parameters, work, _attitude(b, last), _attitude(b, step), model.rate, state)
+                before, now = _attitude(steps, last), _attitude(steps, step)
+                activate_since(structure, parameters, work, before, now, model.rate, state)
             inputs(model.control, time, state[:width], state[width : 2 * width], work.command)
             exert_alone(model, powers.model, time)
         fill_energy_terms(structure, parameters, work, powers.energy_terms)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from finger_pin.core.addresses.law_code import ROW
-from finger_pin.core.addresses.shape_code import GAP_OUT
 from finger_pin.core.collision.broad_phase import activate_all_pairs, activate_since, cull_distant
 from finger_pin.core.evaluation.attitude_charts import place_bodies
 from finger_pin.core.evaluation.paths import turn_out
@@ -28,6 +27,7 @@ from finger_pin.core.tables.chains import BODY
 from finger_pin.core.tables.mechanism_parameters import Parameters
 from finger_pin.core.tables.model import MODEL, Model
 from finger_pin.core.tables.structure import Structure
+from finger_pin.mechanism.gaps.signed_distance import GAP_OUT
 
 
 class States(NamedTuple):

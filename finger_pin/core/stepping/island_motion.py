@@ -11,7 +11,7 @@ from finger_pin.core.jit import call, copied
 from finger_pin.core.signals.bound_models import MIN_STATES_PER_THREAD, BoundModel
 from finger_pin.core.signals.powers import POWERS, Powers, power_many
 from finger_pin.core.stepping.island_stepper import IslandIntegrator, Record
-from finger_pin.core.steps.interpolation import BETWEEN, Between, interpolate_many
+from finger_pin.core.steps.interpolation import INTERPOLATION, Interpolation, interpolate_many
 from finger_pin.description.caching import cached_property
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.threads import in_threads, threads
@@ -46,17 +46,17 @@ class IslandMotion:
     def interpolate(self, at: Array) -> tuple[Array, Array]:
         """Return states at times, shape (m, size), and the quaternions from which angles count, shape (m, f, 4)."""
         at = np.array(at, dtype=float)
-        between = self._between(at, len(at))
+        steps = self._steps_at(at, len(at))
         if len(self.record.times):
-            call(interpolate_many, between, BETWEEN)
+            call(interpolate_many, steps, INTERPOLATION)
         else:
-            between.interpolated[:], between.turned[:] = self.start, self.attitude
-        return between.interpolated, between.turned
+            steps.interpolated[:], steps.turned[:] = self.start, self.attitude
+        return steps.interpolated, steps.turned
 
-    def _between(self, times: Array, count: int = 0) -> Between:
+    def _steps_at(self, times: Array, count: int = 0) -> Interpolation:
         """Return the steps and times with a buffer for m states."""
         record, structure = self.record, self.part.structure
-        return Between(
+        return Interpolation(
             begin=self.begin,
             start=self.start,
             attitude=self.attitude,
@@ -88,9 +88,9 @@ class IslandMotion:
 
         def fill(thread: int) -> None:
             part = slice(thread * count // parts, (thread + 1) * count // parts)
-            between = self._between(np.array(times[part]))
+            steps = self._steps_at(np.array(times[part]))
             energy_terms = np.zeros(len(energies.stored) + len(energies.powers))
-            call(power_many, Powers(self._models[thread].address, between, energy_terms, powers[part]), POWERS)
+            call(power_many, Powers(self._models[thread].address, steps, energy_terms, powers[part]), POWERS)
 
         in_threads(fill, range(parts))
         return powers

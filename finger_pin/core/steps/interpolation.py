@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,9 +17,10 @@ from finger_pin.core.jit import (
     njit_inline,
     unpack,
 )
+from finger_pin.core.steps.tableaus import Tableau
 
 
-class Between(NamedTuple):
+class Interpolation(NamedTuple):
     """The m steps of an island, and arrays for its states at k times.
 
     Attributes:
@@ -53,56 +54,57 @@ class Between(NamedTuple):
     turned: Layers
 
 
-BETWEEN = StructType(Between)
+INTERPOLATION = StructType(Interpolation)
 
 
 @CompiledFunction
 def interpolate_many(address: int, _time: float) -> int:
-    """Fill the interpolated states of a `Between` at an address; at least one step must be stored."""
-    b = unpack(address, BETWEEN)
+    """Fill the interpolated states of an `Interpolation` at an address; at least one step must be stored."""
+    steps = unpack(address, INTERPOLATION)
     step = -1
-    for k in range(b.times.size):
-        step = step_at(b, b.times[k], step)
-        interpolate_within(b, step, b.times[k], b.interpolated[k])
-        for f in range(b.charts.size):
+    for k in range(steps.times.size):
+        step = step_at(steps, steps.times[k], step)
+        interpolate_within(steps, step, steps.times[k], steps.interpolated[k])
+        for f in range(steps.charts.size):
             for c in range(4):
-                b.turned[k, f, c] = b.attitude[f, c] if step == 0 else b.attitudes[step - 1, f, c]
+                steps.turned[k, f, c] = steps.attitude[f, c] if step == 0 else steps.attitudes[step - 1, f, c]
     return 1
 
 
 @njit_inline
-def start_time(b: Any, step: int) -> Any:
+def start_time(steps: Interpolation, step: int) -> float:
     """Return the time at which a step begins."""
-    return b.begin if step == 0 else b.ends[step - 1]
+    return steps.begin if step == 0 else steps.ends[step - 1]
 
 
 @njit_inline
-def step_at(b: Any, time: float, previous: int) -> Any:
+def step_at(steps: Interpolation, time: float, previous: int) -> int:
     """Return the index of the step that contains a time, or -1; the search starts at a known step."""
-    step, last = max(previous, 0), b.ends.size - 1
-    while step > 0 and time < b.ends[step - 1]:
+    step, last = max(previous, 0), steps.ends.size - 1
+    while step > 0 and time < steps.ends[step - 1]:
         step -= 1
-    while step < last and time >= b.ends[step]:
+    while step < last and time >= steps.ends[step]:
         step += 1
     if step != previous:
-        begin_step(b, step)
+        begin_step(steps, step)
     return step
 
 
 @njit_inline
-def begin_step(b: Any, step: int) -> None:
+def begin_step(steps: Interpolation, step: int) -> None:
     """Fill the state at the begin of a step."""
-    for c in range(b.before.size):
-        b.before[c] = b.start[c] if step == 0 else b.states[step - 1, c]
+    for c in range(steps.before.size):
+        steps.before[c] = steps.start[c] if step == 0 else steps.states[step - 1, c]
     if step > 0:
-        reset_angles(b.charts, b.width, b.before)
+        reset_angles(steps.charts, steps.width, steps.before)
 
 
 @njit_inline
-def interpolate_within(b: Any, step: int, time: float, out: Vector) -> None:
+def interpolate_within(steps: Interpolation, step: int, time: float, out: Vector) -> None:
     """Fill the state at a time within the current step."""
-    begin = start_time(b, step)
-    interpolate_share(b.before, b.states[step], b.dense[step], (time - begin) / (b.ends[step] - begin), out)
+    begin = start_time(steps, step)
+    share = (time - begin) / (steps.ends[step] - begin)
+    interpolate_share(steps.before, steps.states[step], steps.dense[step], share, out)
 
 
 @njit_inline
@@ -120,16 +122,16 @@ def interpolate_share(before: Vector, after: Vector, dense: Matrix, share: float
 
 
 @njit_always_inline
-def interpolant(tableau: Any, k: Matrix, dense: Matrix) -> None:
+def interpolant(tableau: Tableau, k: Matrix, dense: Matrix) -> None:
     """Fill the coefficients of a step's interpolant from its stages k, shape (s, size)."""
     for row in range(dense.shape[0]):
         bend = dense[row]
         for c in range(bend.size):
             bend[c] = 0.0
         for j in range(tableau.nodes.size):
-            of_stage = tableau.dense[row, j]
+            weight = tableau.dense[row, j]
             for c in range(bend.size):
-                bend[c] += of_stage * k[j, c]
+                bend[c] += weight * k[j, c]
 
 
 @njit_inline
@@ -148,7 +150,7 @@ def cut_to_share(before: Vector, after: Vector, dense: Matrix, share: float) -> 
 
 
 @njit_always_inline
-def reset_angles(charts: Any, width: int, x: Vector) -> None:
+def reset_angles(charts: Indices, width: int, x: Vector) -> None:
     """Reset the chart angles of free bodies to zero; their rates become the angular velocity."""
     for f in range(charts.size):
         i = charts[f]

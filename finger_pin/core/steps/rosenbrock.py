@@ -29,10 +29,10 @@ def try_step(address: int, integration: Integration, model: Model, time: float, 
             r[c], rate[c], state[c] = 0.0, start[c], x[c]
         # Whole rows at a time, so that the compiler can use vector instructions.
         for j in range(i):
-            of_stage, of_coupling = tableau.stage[i, j], tableau.coupling[i, j] / h
+            stage_weight, coupling_weight = tableau.stage[i, j], tableau.coupling[i, j] / h
             for c in range(size):
-                state[c] += of_stage * k[j, c]
-                r[c] += of_coupling * k[j, c]
+                state[c] += stage_weight * k[j, c]
+                r[c] += coupling_weight * k[j, c]
         if i == 0 and fresh:
             call_at(events.release, address, 0.0)
         if i > 0 or fresh or integration.reevaluate:

@@ -8,11 +8,12 @@ from typing import Annotated, NamedTuple, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from finger_pin.core.addresses.shape_code import OUT, SLOPES, shape_address
+from finger_pin.core.addresses.shape_code import shape_address
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector, refuse_copy
 from finger_pin.core.tables.axes import along
 from finger_pin.core.tables.chains import Chains
 from finger_pin.core.tables.motion_bounds import Carrying, motion_bounds
+from finger_pin.mechanism.gaps.signed_distance import GAP_OUT_SIZE, GAP_SLOPE_SIZE
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place
 
 
@@ -121,7 +122,7 @@ class PathWork(NamedTuple):
     """Working memory for the pieces of paths.
 
     Attributes:
-        out: Values and slopes of the shapes, shape (E, OUT).
+        out: Numbers of the shapes, columns `GAP_OUT` or `SPAN_OUT`, shape (E, columns).
         active: Zero for gaps that are open, shape (E,).
         active_pairs: Contact pairs that are not culled, in order, shape (E,).
         active_pair_count: Their number, shape (1,).
@@ -146,7 +147,7 @@ class PathWork(NamedTuple):
         turn: Of every row, shape (K,).
         local_points: All three points in the piece's frame, shape (E, 9), m.
         gather: Shape (N,).
-        slopes: Of a shape, shape (SLOPES,).
+        slopes: Of a shape, columns `GAP_SLOPE` or `SPAN_SLOPE`.
         wrench_slope: Derivatives of the wrenches by the coordinates that move them, shape (entries, most
             wrenches, WRENCH).
     """
@@ -262,7 +263,7 @@ def build_path_work(paths: PathStructure, count: int, width: int) -> PathWork:
     """Allocate the memory for the pieces of K rows."""
     pieces, entries, columns = len(paths.columns), len(paths.at), int(paths.columns.max(initial=1))
     return PathWork(
-        out=np.zeros((pieces, OUT)),
+        out=np.zeros((pieces, GAP_OUT_SIZE)),
         active=np.ones(pieces, dtype=np.int64),
         active_pairs=np.arange(pieces),
         active_pair_count=np.array([np.count_nonzero(paths.columns > 1)]),
@@ -285,7 +286,7 @@ def build_path_work(paths: PathStructure, count: int, width: int) -> PathWork:
         turn=np.zeros(count),
         local_points=np.zeros((pieces, 9)),
         gather=np.zeros(width),
-        slopes=np.zeros(SLOPES),
+        slopes=np.zeros(GAP_SLOPE_SIZE),
         turn_slope=np.zeros(entries),
         wrench_slope=np.zeros((entries, columns, WRENCH)),
     )

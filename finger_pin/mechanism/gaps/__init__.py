@@ -2,7 +2,7 @@
 
 from finger_pin.mechanism.gaps.distance import PRISM
 from finger_pin.mechanism.gaps.ellipsoids import ELLIPSOIDS
-from finger_pin.mechanism.gaps.nearest import SignedDistance
 from finger_pin.mechanism.gaps.prism import prism_parameters
+from finger_pin.mechanism.gaps.signed_distance import SignedDistance
 
 __all__ = ["ELLIPSOIDS", "PRISM", "SignedDistance", "prism_parameters"]

@@ -8,21 +8,36 @@ the distance |w|, its gradient n = w / |w|, and, with the slope D = dw/dx (symme
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
+
+from finger_pin.mechanism.gaps.vectors import Symmetric, Triple, divide, norm
+from finger_pin.typing import Pointer
 
 #: A half-space is a core so deep below its surface, m, with that rounding: what penetrates it stays outside the core.
 HALF_SPACE_DEPTH = 1.0
 
 
 class GapParameters(NamedTuple):
-    """Places of the parameters of a gap: of a part its rounding, R, the largest s, 0 or 1, and c, then of a prism."""
+    """Columns of the parameters of a gap: first of a part, then of a prism; all but ``along`` in m.
+
+    Attributes:
+        radius: Rounding of the part.
+        disc: Radius R of its disc, 0 for none.
+        along: The largest s: 1 of a part with a length, else 0.
+        third_semi_axis: Length c of an ellipsoid, 0 for other parts.
+        half_x, half_y: Half sides of the core's rectangle.
+        rim: Its widening.
+        low, high: Ends of the core along z.
+        rounding: Of the prism.
+    """
 
     radius: int
     disc: int
     along: int
-    third: int
+    third_semi_axis: int
     half_x: int
     half_y: int
     rim: int
@@ -34,13 +49,28 @@ class GapParameters(NamedTuple):
 GAP = GapParameters(*range(len(GapParameters._fields)))
 
 
-def prism_parameters(shape: str, sizes: Any, fillet: float = 0.0) -> tuple[float, ...]:
+class Offset(NamedTuple):
+    """A point's offset w from a core, m, and its slope D; of the latter, xz and yz are zero."""
+
+    vector: Triple
+    slope: Symmetric
+
+
+class Surface(NamedTuple):
+    """A point's distance from a core, m, its gradient n, and its Hessian, 1/m."""
+
+    distance: float
+    normal: Triple
+    hessian: Symmetric
+
+
+def prism_parameters(shape: str, sizes: Sequence[float], fillet: float = 0.0) -> tuple[float, ...]:
     """Return half_x, half_y, rim, low, high, rounding of a shape, m.
 
     Args:
         shape: ``half_space`` (z <= 0), ``sphere``, ``box``, ``cylinder`` or ``capsule``, the last two along z, all
             others about the origin.
-        sizes: None; radius; three sides; radius and length; radius and length without the ends; m.
+        sizes: None at all; radius; three sides; radius and length; radius and length without the ends; m.
         fillet: Radius with which edges of a box, or the rims of a cylinder, are rounded, m.
     """
     if shape == "half_space":
@@ -56,62 +86,52 @@ def prism_parameters(shape: str, sizes: Any, fillet: float = 0.0) -> tuple[float
     return 0.0, 0.0, radius - fillet, fillet - length / 2.0, length / 2.0 - fillet, fillet
 
 
-def inradius(p: Any) -> Any:
+def inradius(p: Pointer) -> float:
     """Return the inradius of a core, m; 0 without thickness or end."""
     side = p[GAP.rim] if p[GAP.rim] > 0.0 else min(p[GAP.half_x], p[GAP.half_y])
     least = min(side, 0.5 * (p[GAP.high] - p[GAP.low]))
     return least if least < np.inf else 0.0
 
 
-def offset(x: float, y: float, z: float, p: Any, sunk: float) -> Any:
-    """Return w of a point from the core, shrunk by ``sunk`` on all sides, and D as xx, xy, yy, zz."""
-    round_, half_x, half_y, low, high = (
-        p[GAP.rim] > 0.0,
-        p[GAP.half_x],
-        p[GAP.half_y],
-        p[GAP.low] + sunk,
-        p[GAP.high] - sunk,
-    )
+def offset(point: Triple, p: Pointer, shrinkage: float) -> Offset:
+    """Return a point's offset from the core, shrunk on all sides."""
+    x, y, z = point
+    round_, half_x, half_y = p[GAP.rim] > 0.0, p[GAP.half_x], p[GAP.half_y]
+    low, high = p[GAP.low] + shrinkage, p[GAP.high] - shrinkage
     if not round_:
-        half_x, half_y = half_x - sunk, half_y - sunk
+        half_x, half_y = half_x - shrinkage, half_y - shrinkage
     u, v = x - min(max(x, -half_x), half_x), y - min(max(y, -half_y), half_y)
     w = z - min(max(z, low), high)
     # Where the core has no extent, the offset follows the point even if it is zero.
     along_x, along_y = 1.0 * (u != 0.0 or half_x == 0.0), 1.0 * (v != 0.0 or half_y == 0.0)
     along_z = 1.0 * (w != 0.0 or low == high)
     if not round_:
-        return u, v, w, along_x, 0.0, along_y, along_z
-    rim, radius = p[GAP.rim] - sunk, np.sqrt(u * u + v * v)
+        return Offset((u, v, w), Symmetric(along_x, 0.0, 0.0, along_y, 0.0, along_z))
+    rim, radius = p[GAP.rim] - shrinkage, np.sqrt(u * u + v * v)
     if radius <= rim:
-        return 0.0, 0.0, w, 0.0, 0.0, 0.0, along_z
+        return Offset((0.0, 0.0, w), Symmetric(0.0, 0.0, 0.0, 0.0, 0.0, along_z))
     if radius == 0.0:
-        return u, v, w, along_x, 0.0, along_y, along_z
-    share, u_, v_ = 1.0 - rim / radius, u / radius, v / radius
-    across = (1.0 - share) * u_ * v_
-    xx, yy = share * along_x + (1.0 - share) * u_ * u_, share * along_y + (1.0 - share) * v_ * v_
-    return share * u, share * v, w, xx, across, yy, along_z
+        return Offset((u, v, w), Symmetric(along_x, 0.0, 0.0, along_y, 0.0, along_z))
+    share, outwards_x, outwards_y = 1.0 - rim / radius, u / radius, v / radius
+    xx = share * along_x + (1.0 - share) * outwards_x * outwards_x
+    xy = (1.0 - share) * outwards_x * outwards_y
+    yy = share * along_y + (1.0 - share) * outwards_y * outwards_y
+    return Offset((share * u, share * v, w), Symmetric(xx, xy, 0.0, yy, 0.0, along_z))
 
 
-def surface(x: float, y: float, z: float, p: Any, sunk: float) -> Any:
-    """Return a point's distance from the shrunk core, its gradient, and its Hessian as xx, xy, xz, yy, yz, zz.
+def surface(point: Triple, p: Pointer, shrinkage: float) -> Surface:
+    """Return a point's distance from the shrunk core, and its slopes.
 
     Inside the core the gradient is a direction across it.
     """
-    u, v, w, xx, xy, yy, zz = offset(x, y, z, p, sunk)
-    far = np.sqrt(u * u + v * v + w * w)
+    w, d = offset(point, p, shrinkage)
+    far = norm(w)
     if far == 0.0:
-        flat = p[GAP.rim] > sunk or (p[GAP.rim] == 0.0 and p[GAP.half_x] > sunk)
-        return (0.0, (0.0 if flat else 1.0), 0.0, (1.0 if flat else 0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    u, v, w = u / far, v / far, w / far
-    return (
-        far,
-        u,
-        v,
-        w,
-        (xx - u * u) / far,
-        (xy - u * v) / far,
-        -u * w / far,
-        (yy - v * v) / far,
-        -v * w / far,
-        (zz - w * w) / far,
+        flat = p[GAP.rim] > shrinkage or (p[GAP.rim] == 0.0 and p[GAP.half_x] > shrinkage)
+        return Surface(0.0, (0.0, 0.0, 1.0) if flat else (1.0, 0.0, 0.0), Symmetric(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    n = divide(w, far)
+    hessian = Symmetric(
+        *((d.xx - n[0] * n[0]) / far, (d.xy - n[0] * n[1]) / far, -n[0] * n[2] / far),
+        *((d.yy - n[1] * n[1]) / far, -n[1] * n[2] / far, (d.zz - n[2] * n[2]) / far),
     )
+    return Surface(far, n, hessian)

@@ -7,7 +7,7 @@ other through an angle phi. Length and turn are functions of these three. Which 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 #: Which way the path goes.
 FREE, SHORT_WAY, LONG_WAY, INSIDE = range(4)
@@ -23,23 +23,25 @@ _MOST_STEPS = 50
 class CirclePath(NamedTuple):
     """Length P and turn T of a path, with their derivatives by r_0, r_1 and phi."""
 
-    length: Any
-    by_r0: Any
-    by_r1: Any
-    by_angle: Any
-    by_r0_r0: Any
-    by_r1_r1: Any
-    by_angle_angle: Any
-    by_r0_r1: Any
-    by_r0_angle: Any
-    by_r1_angle: Any
-    turn: Any
-    turn_by_r0: Any
-    turn_by_r1: Any
-    turn_by_angle: Any
+    length: float
+    by_r0: float
+    by_r1: float
+    by_angle: float
+    by_r0_r0: float
+    by_r1_r1: float
+    by_angle_angle: float
+    by_r0_r1: float
+    by_r0_angle: float
+    by_r1_angle: float
+    turn: float
+    turn_by_r0: float
+    turn_by_r1: float
+    turn_by_angle: float
 
 
-def way_of_path(r0: Any, r1: Any, angle: Any, radius: Any, along: Any, across: Any, has_side: Any, inside: Any) -> Any:
+def way_of_path(
+    r0: float, r1: float, angle: float, radius: float, along: float, across: float, has_side: float, inside: float
+) -> int:
     """Return the direction of the path around the circle.
 
     A path wraps if, on its way, the ends are further apart than where their tangents meet the circle. With a side
@@ -70,14 +72,14 @@ def way_of_path(r0: Any, r1: Any, angle: Any, radius: Any, along: Any, across: A
     return SHORT_WAY if angle > touching else FREE
 
 
-def path(side: Any, r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
+def path(way: int, r0: float, r1: float, angle: float, radius: float) -> CirclePath:
     """Return length and turn of a path, and their derivatives."""
-    if side == INSIDE:
+    if way == INSIDE:
         return _inside(r0, r1, angle, radius)
-    return _around(max(r0, radius), max(r1, radius), angle if side == SHORT_WAY else 2.0 * math.pi - angle, radius)
+    return _around(max(r0, radius), max(r1, radius), angle if way == SHORT_WAY else 2.0 * math.pi - angle, radius)
 
 
-def _around(r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
+def _around(r0: float, r1: float, angle: float, radius: float) -> CirclePath:
     """Return the path around the circle: two tangents and the arc between them, as `path` does."""
     h0, h1 = math.sqrt((r0 - radius) * (r0 + radius)), math.sqrt((r1 - radius) * (r1 + radius))
     turn = angle - math.acos(radius / r0) - math.acos(radius / r1)
@@ -92,7 +94,7 @@ def _around(r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
     )
 
 
-def _inside(r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
+def _inside(r0: float, r1: float, angle: float, radius: float) -> CirclePath:
     """Return `path` of two lines with the least sum that meet on the circle, at equal angles to its normal.
 
     With f(r, psi) the distance of an end from the point psi further on the circle, P = f(r_0, psi) + f(r_1, phi - psi)
@@ -120,7 +122,7 @@ def _inside(r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
     )
 
 
-def _meeting(r0: Any, r1: Any, angle: Any, radius: Any) -> Any:
+def _meeting(r0: float, r1: float, angle: float, radius: float) -> float:
     """Return the zero psi of dP/dpsi, which rises: Newton's steps, halved if they leave the bracket."""
     low, high = max(0.0, angle - math.acos(radius / r1)), min(angle, math.acos(radius / r0))
     psi = 0.5 * (low + high)
