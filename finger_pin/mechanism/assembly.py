@@ -131,6 +131,7 @@ def assemble(
         routing.actuated,
         moved=description.hand is not None and description.hand.palm.path is not None,
         prescribed=_numbers_on_paths(description, width),
+        tendons=("passive_halves", "driven_tendons", *matrices, *canals.wraps),
     )
     scene = Scene.from_mechanism(alone, args.objects, description, paths.placed)
     mechanism = alone if scene is None else scene.extend(alone)

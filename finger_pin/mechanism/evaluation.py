@@ -44,6 +44,7 @@ class Evaluation:
         energies: Its energies and powers.
         rows: Signals of the rows, by table.
         torque: Sum of A^T phi, shape (..., N).
+        tendon_torque: The part of tables of tendons in it, (11), shape (..., N).
         external: J^T F, shape (..., N).
         acceleration: v', shape (..., N).
         rate: Time derivative of the packed state, shape (..., size).
@@ -56,6 +57,7 @@ class Evaluation:
     energies: Energies
     rows: dict[str, RowSignals]
     torque: Array
+    tendon_torque: Array
     external: Array
     acceleration: Array
     rate: Array

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 
 import numpy as np
 import pinocchio as pin
@@ -21,7 +20,7 @@ from finger_pin.mechanism.from_pinocchio import on_model
 from finger_pin.mechanism.groups import CANALS
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.rows import Rows, RowSignals
+from finger_pin.mechanism.rows import Rows
 from finger_pin.mechanism.state import Motion, as_floats
 from finger_pin.mechanism.tendon_paths import Excursions
 from finger_pin.mechanism.tree_mechanism import build_body
@@ -146,7 +145,7 @@ class Finger:
         whole, joints = self.mechanism, len(self.routing.joints)
         prescribed = np.append(np.arange(joints), np.full(whole.coordinates - joints, -1))
         parts = whole.body, whole.listed, whole.lumps, whole.inertia, whole.channels
-        finger.mechanism = Mechanism(*parts, prescribed=prescribed)
+        finger.mechanism = Mechanism(*parts, prescribed=prescribed, tendons=whole.tendons)
         return finger
 
     @property
@@ -230,10 +229,8 @@ class Finger:
     def signals(self, x: Array, inputs: Array, fingertip_force: Array | None, evaluation: Evaluation) -> FingerSignals:
         """Return an evaluation of the mechanism by the names of the paper."""
         force = np.zeros(3) if fingertip_force is None else np.asarray(fingertip_force, dtype=float)
-        bodies, torque = int(self.mechanism.body.model.nv), partial(self.tendon_torque, x, evaluation.rows)
-        return FingerSignals(
-            self.layout.unpack(x), inputs, force, evaluation, bodies, self.drive_matrices, self.wraps, torque
-        )
+        state, bodies = self.layout.unpack(x), int(self.mechanism.body.model.nv)
+        return FingerSignals(state, inputs, force, evaluation, bodies, self.drive_matrices, self.wraps)
 
     @property
     def wrap_names(self) -> tuple[str, ...]:
@@ -246,19 +243,6 @@ class Finger:
     def cord_names(self) -> tuple[str, ...]:
         """Names of the cords of a tree that servos, muscles and springs pull, in the order of `cord_tension`."""
         return next((table.names for table in self.extra_rows if table.group == CANALS), ())
-
-    @property
-    def tendon_rows(self) -> tuple[str, ...]:
-        """The tables of rows that are tendons."""
-        return "passive_halves", "driven_tendons", *self.drive_matrices, *self.wraps
-
-    def tendon_torque(self, x: Array, rows: Mapping[str, RowSignals]) -> Array:
-        """Return H_c2^T f, the torque of the tendons (11), at packed states, shape (..., n), N m."""
-        tables = [rows[group] for group in self.tendon_rows]
-        torque = self._excursions.torque(x, tables[0])
-        for table in tables[1:]:
-            torque = torque + self._excursions.torque(x, table)
-        return torque
 
     def coupling_at(self, position: Array) -> Array:
         """Return H_c at postures, shape (..., n), with the arms that tendons along paths have there: (..., t, n), m."""

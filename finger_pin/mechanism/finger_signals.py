@@ -164,7 +164,6 @@ class FingerSignals:
         bodies: Number of velocities of the rigid body, before those of passive tendons.
         drive_matrices: Weights with which further tables pull the strands, by table, as of `Tendons.drive_matrices`.
         wraps: By table of wraps beyond the first ones, which row is of which tendon, shape (t, rows).
-        compute_tendon_torque: Returns the torque of the tendons, as `Finger.tendon_torque`.
     """
 
     state: State
@@ -174,7 +173,6 @@ class FingerSignals:
     bodies: int
     drive_matrices: Mapping[str, Array]
     wraps: Mapping[str, Array]
-    compute_tendon_torque: Callable[[], Array]
 
     @cached_property
     def tendons(self) -> TendonForces:
@@ -227,10 +225,10 @@ class FingerSignals:
         springs = self.mechanism.rows["joint_springs"]
         return self._at_joints(-weighted_sum(springs.force, springs.rows.arm))
 
-    @cached_property
+    @property
     def tendon_torque(self) -> Array:
         """H_c2^T f, shape (..., n), N m, (11)."""
-        return self.compute_tendon_torque()
+        return self._at_joints(self.mechanism.tendon_torque)
 
     @property
     def external_torque(self) -> Array:

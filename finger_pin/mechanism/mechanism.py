@@ -59,6 +59,7 @@ class Mechanism:
         channels: Number of inputs from outside.
         moved: Whether the base moves along a path.
         prescribed: For coordinates that are moved along paths, the number of their acceleration among all; else -1.
+        tendons: Names of the tables that are tendons, whose torque is also summed up apart.
     """
 
     def __init__(
@@ -70,6 +71,7 @@ class Mechanism:
         channels: int = 0,
         moved: bool = False,
         prescribed: NDArray[np.int64] | None = None,
+        tendons: Sequence[str] = (),
     ) -> None:
         """Join coordinates and rows, as wide as there are coordinates; more inputs than rows have if asked for."""
         self.body = body
@@ -78,7 +80,7 @@ class Mechanism:
         # The core evaluates contacts before all else.
         self.listed = tuple(sorted(rows, key=lambda table: table.law.arms == 1))
         self.rows = sort_tables(self.listed)
-        self.moved = moved
+        self.moved, self.tendons = moved, tuple(tendons)
         self.prescribed = np.full(self.coordinates, -1) if prescribed is None else prescribed
         self.energies = Energies.from_rows(self.rows, moved, not moved and bool(np.any(self.prescribed >= 0)))
         self.channels = max([channels, *(int(table.channels.max(initial=-1)) + 1 for table in self.rows)])
@@ -145,7 +147,7 @@ class Mechanism:
         q, v, _ = self.split(x)
         joints, turning, lead = int(self.body.model.nv), q[..., : self.body.model.nq], x.shape[:-1]
         forces = self._forces(force, lead)
-        rows, torque = self._rows(x, np.asarray(command, dtype=float), forces, sliding)
+        rows, torque, tendon_torque = self._rows(x, np.asarray(command, dtype=float), forces, sliding)
         external = np.zeros_like(torque)
         if np.any(forces):
             external[..., :joints] = self.body.external_torque(turning, forces)
@@ -172,6 +174,7 @@ class Mechanism:
             energies=self.energies,
             rows=rows,
             torque=torque,
+            tendon_torque=tendon_torque,
             external=external,
             acceleration=acceleration,
             base_power=np.zeros((*lead, 1)) if power is None and self.moved else power,
@@ -196,14 +199,14 @@ class Mechanism:
 
     def _rows(
         self, x: Array, command: Array, forces: Array, sliding: Sliding | None
-    ) -> tuple[dict[str, RowSignals], Array]:
-        """Return the signals of all tables under inputs and forces at tips, and the sum of A^T phi, shape (..., N)."""
+    ) -> tuple[dict[str, RowSignals], Array, Array]:
+        """Return signals of all tables under inputs and forces at tips, and sums of A^T phi, of all and of tendons."""
         q, v, z = self.split(x)
         turning, linear, lead = q[..., : self.body.model.nq], self.linear_positions(q), x.shape[:-1]
         states = {table.group: z[..., part] for table, part in zip(self.rows, self.states, strict=True)}
         rows, earlier = dict[str, RowSignals](), dict[str, Array]()
         touching: list[tuple[Paths, Array]] = []
-        torque = np.zeros((*lead, self.coordinates))
+        torque, tendon_torque = np.zeros((2, *lead, self.coordinates))
         for table in self.rows:
             routed = self._routed(table, turning)
             arm = table.arm + routed.arm
@@ -224,8 +227,9 @@ class Mechanism:
             rows[table.group], earlier[table.group] = RowSignals(table, arguments, exerted, rate, signals), exerted
             if table.law.arms > 1:
                 touching.append((table.paths[:: table.law.arms], _vectors(exerted, routed.force, table.law.arms)))
-            torque = torque + (exerted[..., None, :] @ arm)[..., 0, :]
-        return rows, torque
+            parts = (exerted[..., None, :] @ arm)[..., 0, :]
+            torque, tendon_torque = torque + parts, tendon_torque + parts * (table.group in self.tendons)
+        return rows, torque, tendon_torque
 
     def _forces(self, force: Array | None, lead: tuple[int, ...]) -> Array:
         """Return the forces at all tips, shape (..., t, 3)."""
@@ -239,10 +243,8 @@ class Mechanism:
             return PathKinematics(*np.zeros((4, 1)))
         if q.ndim == 1:
             return path_kinematics(self.body, q, table.paths, self.coordinates)
-        kinematics = [path_kinematics(self.body, one, table.paths, self.coordinates) for one in q]
-        return PathKinematics(
-            *(np.array([getattr(one, name) for one in kinematics]) for name in PathKinematics.__annotations__)
-        )
+        kinematics = [vars(path_kinematics(self.body, one, table.paths, self.coordinates)) for one in q]
+        return PathKinematics(**{name: np.array([each[name] for each in kinematics]) for name in kinematics[0]})
 
     def _inertial(self, q: Array, v: Array, base: Array) -> Array:
         """Return the torques that the motion of the base adds to gravity at rest, shape (..., n)."""
@@ -295,5 +297,4 @@ def _weighted(weights: Mapping[str, Array], values: Mapping[str, Array], start: 
 def _vectors(force: Array, directions: Array, arms: int) -> Array:
     """Return the sum of the forces of every contact as vectors, shape (..., m, 3)."""
     vectors = force[..., None] * directions
-    total: Array = vectors.reshape(*vectors.shape[:-2], -1, arms, 3).sum(axis=-2)
-    return total
+    return np.asarray(vectors.reshape(*vectors.shape[:-2], -1, arms, 3).sum(axis=-2))

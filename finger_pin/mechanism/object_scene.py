@@ -146,14 +146,14 @@ class Scene:
         width = bodies + lumps
         rows = [table.embed_coordinates(places, width) for table in mechanism.listed]
         before = int(mechanism.prescribed.max(initial=-1)) + 1
-        lumps_of = mechanism.lumps, mechanism.inertia
+        kept = mechanism.lumps, mechanism.inertia, mechanism.channels, mechanism.moved
         prescribed = np.full(bodies + lumps, -1)
         prescribed[places] = mechanism.prescribed
         prescribed[bodies - len(self.world) : bodies] = np.arange(len(self.world))
         on_paths = [joints + VELOCITY * index for index, each in enumerate(self.free.values()) if each.mass is None]
         for number, first in enumerate(on_paths):
             prescribed[first : first + VELOCITY] = before + VELOCITY * number + np.arange(VELOCITY)
-        return Mechanism(self.body, [self.contacts, *rows], *lumps_of, mechanism.channels, mechanism.moved, prescribed)
+        return Mechanism(self.body, [self.contacts, *rows], *kept, prescribed, mechanism.tendons)
 
     @property
     def world(self) -> tuple[str, ...]:

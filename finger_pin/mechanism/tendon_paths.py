@@ -15,7 +15,6 @@ from finger_pin.description.waypoints import Waypoint
 from finger_pin.mechanism.body_places import Placed, rotation
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place, path_kinematics
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.rows import RowSignals, weighted_sum
 from finger_pin.mechanism.spans import CYLINDER, SPHERE, STRAIGHT
 from finger_pin.mechanism.spans.span import COINCIDENT, SIDE_ON_OTHER_BODY
 from finger_pin.mechanism.tendon_wraps import Wrap
@@ -201,15 +200,3 @@ class Excursions:
         if self._through_space.size:
             coupling[..., self._through_space, :] = -self._paths.arms(position)
         return coupling
-
-    def torque(self, x: Array, tendons: RowSignals) -> Array:
-        """Return the torque of driven or elastic tendons at packed states, shape (..., size): shape (..., n), N m."""
-        joints, rows = self._coupling.shape[1], tendons.rows
-        if not rows.routed:
-            return weighted_sum(tendons.force, rows.arm)[..., :joints]
-        body, width = self._paths.body, rows.arm.shape[1]
-        torque = np.zeros((*x.shape[:-1], joints))
-        for at in np.ndindex(x.shape[:-1]):
-            arm = path_kinematics(body, x[at][:joints], rows.paths, width).arm + rows.arm
-            torque[at] = (tendons.force[at] @ arm)[:joints]
-        return torque

@@ -45,6 +45,8 @@ class SignalBuffer(NamedTuple):
     first: int
     column: int
     torques: Array
+    tendons: Array
+    tendon_torques: Array
     externals: Array
     energy_terms: Array
     touches: Array
@@ -52,9 +54,8 @@ class SignalBuffer(NamedTuple):
     def part(self, at: slice) -> SignalBuffer:
         """Return the buffer of some of the states, the same memory."""
         first = self.first + at.indices(len(self.packed))[0]
-        arrays = (self.packed, self.rates, self.torques, self.externals, self.energy_terms, self.touches)
-        packed, rates, torques, externals, energy_terms, touches = (values[at] for values in arrays)
-        return SignalBuffer(packed, rates, self.rows, first, self.column, torques, externals, energy_terms, touches)
+        names = ("packed", "rates", "torques", "tendon_torques", "externals", "energy_terms", "touches")
+        return self._replace(first=first, **{name: getattr(self, name)[at] for name in names})
 
     def states(
         self, at: slice, model: int, states: Array, commands: Array, forces: Array, bases: Array, attitudes: Array
@@ -71,6 +72,8 @@ class SignalBuffer(NamedTuple):
             first=buffer.first,
             column=buffer.column,
             torques=buffer.torques,
+            tendons=buffer.tendons,
+            tendon_torques=buffer.tendon_torques,
             externals=buffer.externals,
             energy_terms=buffer.energy_terms,
             bases=bases[at],

@@ -90,6 +90,10 @@ class CompiledMechanism:
             first=0,
             column=ROW.force if forces_only else 0,
             torques=np.empty((summed_states, width)),
+            tendons=np.concatenate(
+                [np.zeros(0), *(np.full(each.count, float(each.group in mechanism.tendons)) for each in mechanism.rows)]
+            ),
+            tendon_torques=np.empty((row_states, width)),
             externals=np.empty((summed_states, width)),
             energy_terms=np.empty((summed_states, len(mechanism.energies.stored) + len(mechanism.energies.powers))),
             # Of what touches, forces are added up.
@@ -129,6 +133,7 @@ class CompiledMechanism:
             mechanism.energies,
             signals,
             buffer.torques[at],
+            buffer.tendon_torques[at],
             buffer.externals[at],
             acceleration[at],
             rate[at],

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -48,8 +47,7 @@ class CompiledFingers:
         self._bases = np.zeros((count, 15 + self._prescribed))
         # By whether there are forces at the tips, and whether the base moves.
         self._blocks: dict[tuple[bool, bool], list[Block]] = {}
-        # Whether tendons have other arms than the first one's, and whether tips are elsewhere than the mover's.
-        self._differs = np.array([self._differences(each) for each in fingers])
+        self._at_home = np.array([self._is_at_home(each) for each in fingers])
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return constructor and arguments for `copy.deepcopy` and pickles: a copy binds copies of the fingers."""
@@ -61,24 +59,19 @@ class CompiledFingers:
             self._fingers[index], self._first = finger, self._fingers[0]
             for kind, blocks in self._blocks.items():
                 blocks[index] = self._bound(index, *kind)
-        if index:
-            self._differs[index] = self._differences(finger)
-        else:
-            self._differs = np.array([self._differences(each) for each in self._fingers])
+        compared = range(len(self._fingers)) if finger is self._mover else (index,)
+        self._at_home[[*compared]] = [self._is_at_home(self._fingers[each]) for each in compared]
 
-    def _differences(self, finger: CompiledFinger) -> tuple[bool, bool]:
-        pair, joints = (finger, self._first), len(finger.finger.routing.joints)
-        rows = [
-            [table for table in each.finger.mechanism.rows if table.group in each.finger.tendon_rows] for each in pair
-        ]
-        pairs = zip(*rows, strict=True)
-        same_arms = all(one.arm is other.arm or np.array_equal(one.arm, other.arm) for one, other in pairs)
-        at_home = finger is self._mover
-        if not at_home:
-            numbers = [each.mechanism.parameters for each in (finger, self._mover)]
-            bodies = [(each.bodies[:joints], each.tip_offset, each.gravity) for each in numbers]
-            at_home = all(map(np.array_equal, *bodies))
-        return not same_arms or any(table.routed for table in rows[0]), not at_home
+    def _is_at_home(self, finger: CompiledFinger) -> bool:
+        """Return whether the tips of a finger are where the mover's are."""
+        if finger is self._mover:
+            return True
+        joints, numbers = (
+            len(finger.finger.routing.joints),
+            (finger.mechanism.parameters, self._mover.mechanism.parameters),
+        )
+        bodies = [(each.bodies[:joints], each.tip_offset, each.gravity) for each in numbers]
+        return all(map(np.array_equal, *bodies))
 
     def _bound(self, index: int, loaded: bool, moved: bool) -> Block:
         """Return a block with a finger, its state, and the arrays of its signals."""
@@ -115,15 +108,7 @@ class CompiledFingers:
         for block in self._blocks[kind]:
             evaluate_many(block.address)
         evaluation = mechanism.to_evaluation(self._buffer)
-        signals = self._first.finger.signals(x, command, fingertip_force, evaluation)
-        if not self._differs[:, 0].any():
-            return signals
-
-        def tendon_torque() -> Array:
-            rows = [each.mechanism.to_evaluation(self._buffer, index).rows for index, each in enumerate(self._fingers)]
-            return np.array([each.finger.tendon_torque(*at) for each, *at in zip(self._fingers, x, rows, strict=True)])
-
-        return replace(signals, compute_tendon_torque=tendon_torque)
+        return self._first.finger.signals(x, command, fingertip_force, evaluation)
 
     def powers(
         self, x: Array, command: Array, fingertip_force: Array | None = None, base: Array | None = None
@@ -135,7 +120,7 @@ class CompiledFingers:
 
     def motion(self, position: Array, velocity: Array, base: Array | None = None) -> Motion:
         """Return fingertips and energies of the rigid bodies at positions and velocities, shape (m, n)."""
-        if not self._differs[:, 1].any() and base is None:
+        if self._at_home.all() and base is None:
             return self._mover.motion(position, velocity)
         bases = [None] * len(position) if base is None else base
         motions = [

@@ -44,7 +44,9 @@ class States(NamedTuple):
         first: Where in it the first state stands.
         column: The first column of the table that is wanted.
         torques: Filled with the sum of A^T phi, shape (m, N), or (0, N) if only rows are wanted.
-        externals: Filled with J^T F, likewise.
+        tendons: 1 for the rows of tendons, 0 for all others, shape (K,).
+        tendon_torques: Filled with the sum of A^T phi over tendons, shape (m, N), or (0, N).
+        externals: Filled with J^T F, as ``torques``.
         energy_terms: Filled with energies and powers, shape (m, energies) or (0, energies); the last is that of a base
             that moves.
         bases: Velocity, acceleration and gravity of the base, and accelerations of what is moved along paths, shape
@@ -63,6 +65,8 @@ class States(NamedTuple):
     first: int
     column: int
     torques: Matrix
+    tendons: Vector
+    tendon_torques: Matrix
     externals: Matrix
     energy_terms: Matrix
     bases: Matrix
@@ -191,6 +195,14 @@ def _store_signals(many: States, model: Model, m: int) -> None:
         for c in range(rows.shape[0]):
             for k in range(rows.shape[2]):
                 rows[c, many.first + m, k] = work.rows[many.column + c, k]
+    if many.tendon_torques.shape[0] > 0:
+        torque = many.tendon_torques[m]
+        for j in range(torque.size):
+            torque[j] = 0.0
+        for a in range(structure.arm_row.size):
+            k = structure.arm_row[a]
+            if many.tendons[k] != 0.0:
+                torque[structure.arm_at[a]] += work.arm[a] * work.rows[ROW.force, k]
     if many.touches.shape[0] > 0 and structure.contact_rows:
         _fill_contact_points(structure, work, many.touches[m])
     if many.energy_terms.shape[0] > 0:
