@@ -19,9 +19,10 @@ import finger_pin as fp
 from finger_pin.description.loading import load_bench
 from finger_pin.description.scenario import Scenario
 from finger_pin.identification.comparison import SCENARIO_LAW, bic
-from finger_pin.identification.estimate import fit
-from finger_pin.identification.models import build_problem
-from finger_pin.identification.recordings import read_recording
+from finger_pin.identification.residuals.models import fitted_residuals
+from finger_pin.identification.residuals.recordings import read_recording
+from finger_pin.identification.search.gauss_newton import fit
+from finger_pin.identification.search.objective import Objective
 from finger_pin.views.plots import save_figure
 from finger_pin.views.plots.panels import grid, plain_ticks, title
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, colour, styled, thin
@@ -143,11 +144,11 @@ def comparable_bic(bench: str, law: Law, result: xr.Dataset, reference: xr.Datas
     scenario, parameters, recordings = law_problem(bench, law)
     scenario, settings = load_bench(scenario, None, {"parameters": parameters, "recordings": recordings})
     recorded = [read_recording(name, each, None) for name, each in settings.recordings.items()]
-    problem = build_problem(scenario, settings, recorded)
-    values, shares = problem.values(problem.start), reference["independent_share"].values[problem.groups]
-    values[: problem.requested_count] = result["estimate"].values
-    best = fit(problem, problem.to_search(values), weights=shares)
-    return bic(best.residuals, shares, problem.requested_count, problem.noise_groups, problem.least_noise)
+    residuals = fitted_residuals(scenario, settings, recorded)
+    shares = reference["independent_share"].values[residuals.likelihood.outputs]
+    start = residuals.parameters.at_values(result["estimate"].values)
+    best = fit(Objective(residuals), start, weights=shares)
+    return bic(residuals.likelihood, best.residuals, shares, len(residuals.parameters.bounds))
 
 
 def by_variable(result: xr.Dataset, along: str, values: str, samples: str, power: float = 1.0) -> dict[str, float]:

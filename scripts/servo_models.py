@@ -22,10 +22,11 @@ from scipy.optimize import differential_evolution
 from finger_pin.description.loading import load_bench
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
-from finger_pin.identification.models import recording_models
-from finger_pin.identification.problem import Problem
-from finger_pin.identification.recordings import Recording, read_recording
-from finger_pin.identification.scenario_parameters import with_recorded_values
+from finger_pin.identification.parameters.parameters import Parameters
+from finger_pin.identification.parameters.scenarios import with_recorded_values
+from finger_pin.identification.residuals.models import recording_models
+from finger_pin.identification.residuals.recordings import Recording, read_recording
+from finger_pin.identification.residuals.residuals import Residuals
 
 BENCH, SERVO, ARM = "servo_pendulum", "servo", "arm"
 _ACTUATOR = f"finger.actuators.{SERVO}."
@@ -181,8 +182,7 @@ def core_errors(recordings: Sequence[Recording], values: Mapping[str, float], mo
     keys = {f"{_ACTUATOR}motor.{KEYS[name]}": value for name, value in values.items()}
     scenario, _ = load_bench(BENCH, {**more, **keys})
     models, signals = recording_models(scenario, recordings, None, [np.ones(len(r.time), bool) for r in recordings])
-    problem = Problem(scenario, (), np.zeros(0), np.zeros(0), models, signals, {})
-    return problem.residuals(problem.start)
+    return Residuals(scenario, Parameters({}, models), models, signals).residuals(np.zeros(0))
 
 
 def fit(

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 from scipy.stats import t as student
 
-from finger_pin.identification.estimate import GAIN_REFIT, Fit, fit, information
 from finger_pin.identification.intervals import LEAST_FREEDOM, NORMAL_95, inverse_within_bounds
 from finger_pin.identification.misfit import outliers
-from finger_pin.identification.problem import Problem
+from finger_pin.identification.residuals.residuals import Residuals
+from finger_pin.identification.search.gauss_newton import GAIN_REFIT, Fit, fit, fit_at, information
+from finger_pin.identification.search.objective import Objective
 from finger_pin.typing import Array
 
 #: Masks of the samples of every signal that a setting has.
@@ -40,50 +41,44 @@ class CrossValidation:
     estimates: Array
     residuals: Sequence[Array]
 
-    def band_factors(self, problem: Problem, noise: Array, slopes: Sequence[Array], covariance: Array) -> Array:
+    def band_factors(self, objective: Objective[Residuals], minimum: Fit, noise: Array, covariance: Array) -> Array:
         """Return factors on the bands of every signal, shape (s,), by which they hold 95 % of what was left out.
 
         Every setting counts the same, whatever its number of samples. No factor is below 1.
 
         Args:
-            problem: The problem that was fitted.
+            objective: The objective that was fitted.
+            minimum: Of the objective.
             noise: Deviation of further readings of every signal, shape (s,).
-            slopes: Derivatives of the residuals of every signal by z, shape (m, p) each.
             covariance: Of z, by the likelihood, shape (p, p).
         """
-        names = np.array([signal.name for signal in problem.signals])
-        ratios, weights = list[Array](), list[Array]()
-        for k, (residuals, j) in enumerate(zip(self.residuals, slopes, strict=True)):
-            half = NORMAL_95 * np.sqrt(noise[k] ** 2 + parameter_variance(j, covariance, residuals))
-            weight = np.zeros(len(half))
-            missed = np.zeros(len(half))
-            for errors, setting in zip(residuals, self.settings.values(), strict=True):
-                rows = setting[k]
-                missed[rows] = np.abs(errors[rows])
-                count = sum(np.count_nonzero(setting[other]) for other in np.flatnonzero(names == names[k]))
-                weight[rows] = 1.0 / max(count, 1)
-            ratios.append(missed / half)
-            weights.append(weight)
-        factors = np.ones(len(names))
-        for name in np.unique(names):
-            members = np.flatnonzero(names == name)
-            pooled, shares = (np.concatenate([each[k] for k in members]) for each in (ratios, weights))
-            factors[members] = max(1.0, _weighted_quantile(pooled, shares, 0.95))
+        kinds, slopes = objective.likelihood.kinds, objective.slopes(minimum.z)
+        factors = np.ones(len(kinds))
+        for kind in np.unique(kinds):
+            members, ratios, weights = np.flatnonzero(kinds == kind), list[Array](), list[Array]()
+            for k in members.tolist():
+                variance = noise[k] ** 2 + parameter_variance(slopes[k], covariance, self.residuals[k])
+                for errors, setting in zip(self.residuals[k], self.settings.values(), strict=True):
+                    ratios.append(np.abs(errors[setting[k]]) / (NORMAL_95 * np.sqrt(variance[setting[k]])))
+                    count = sum(np.count_nonzero(setting[other]) for other in members)
+                    weights.append(np.full(len(ratios[-1]), 1.0 / max(count, 1)))
+            quantile = _weighted_quantile(np.concatenate(ratios), np.concatenate(weights), 0.95)
+            factors[members] = max(1.0, quantile)
         return factors
 
 
-def shift_deviations(problem: Problem, minimum: Fit, settings: Mapping[str, Setting]) -> Array:
+def shift_deviations(objective: Objective[Residuals], minimum: Fit, settings: Mapping[str, Setting]) -> Array:
     """Return the standard deviations by noise alone of the shifts of z without each setting, shape (r, p).
 
     Of an efficient estimate they are those of the variance without the setting less that with it (Hausman,
     Econometrica 46, 1978); zero where the setting tells nothing.
     """
-    slopes, whole = problem.slopes(minimum.z), information(problem, minimum)
-    variance, rows = np.diag(inverse_within_bounds(problem, whole)), list[Array]()
+    slopes, whole = objective.slopes(minimum.z), information(objective, minimum)
+    variance, rows = np.diag(inverse_within_bounds(objective, whole)), list[Array]()
     for setting in settings.values():
         columns = zip(minimum.weights / minimum.noise**2, slopes, setting, strict=True)
         part = sum(factor * j[mask].T @ j[mask] for factor, j, mask in columns)
-        rows.append(np.diag(inverse_within_bounds(problem, whole - part)) - variance)
+        rows.append(np.diag(inverse_within_bounds(objective, whole - part)) - variance)
     return np.sqrt(np.maximum(rows, 0.0))
 
 
@@ -108,14 +103,14 @@ def parameter_variance(slopes: Array, covariance: Array, refitted: Array) -> Arr
     return np.asarray(np.maximum(variance, factor**2 * (count - 1) * np.var(refitted, axis=0)))
 
 
-def find_settings(problem: Problem) -> dict[str, Setting]:
+def find_settings(function: Residuals) -> dict[str, Setting]:
     """Return the settings by name: recordings or, of less than three, loads of their readings; none of too few."""
-    recordings = dict.fromkeys(signal.recording for signal in problem.signals)
-    by_load = len(recordings) < 3 and not problem.has_motion
-    loads = [np.nan_to_num(s.load) if by_load else np.zeros(len(s.measured)) for s in problem.signals]
+    recordings = dict.fromkeys(signal.recording for signal in function.signals)
+    by_load = len(recordings) < 3 and function.exact
+    loads = [np.nan_to_num(s.load) if by_load else np.zeros(len(s.measured)) for s in function.signals]
     pairs = dict.fromkeys(
         (signal.recording, float(level))
-        for signal, load in zip(problem.signals, loads, strict=True)
+        for signal, load in zip(function.signals, loads, strict=True)
         for level in np.unique(load)
     )
     if len(pairs) < (_LEAST_LOADS if by_load else _LEAST_RECORDINGS):
@@ -123,38 +118,40 @@ def find_settings(problem: Problem) -> dict[str, Setting]:
     return {
         f"{recording} at {level:.4g} N" if by_load else recording: [
             (load == level) & (signal.recording == recording)
-            for signal, load in zip(problem.signals, loads, strict=True)
+            for signal, load in zip(function.signals, loads, strict=True)
         ]
         for recording, level in pairs
     }
 
 
-def refit_without(problem: Problem, minimum: Fit, settings: Mapping[str, Setting], name: str, loss: str) -> Fit:
+def refit_without(
+    objective: Objective[Residuals], minimum: Fit, settings: Mapping[str, Setting], name: str, loss: str
+) -> Fit:
     """Return the minimum without a setting, within the bounds, with the residuals of all samples there.
 
     Args:
-        problem: The problem that was fitted.
-        minimum: Of the problem.
+        objective: The objective that was fitted.
+        minimum: Of the objective.
         settings: All settings.
         name: The setting that is left out.
         loss: As for `fit`.
     """
-    ratios = outliers(problem, minimum.residuals)
+    ratios = outliers(objective.function, minimum.residuals)
     kept = [~out & (ratio == 0.0) for out, ratio in zip(settings[name], ratios, strict=True)]
-    all_slopes = problem.slopes(minimum.z)
+    all_slopes = objective.slopes(minimum.z)
     slopes = [j[rows] for j, rows in zip(all_slopes, kept, strict=True)]
-    if len(settings) > (_MAX_MOTION_REFITS if problem.has_motion else _MAX_READING_REFITS):
-        z = _step(problem, minimum, kept, slopes)
-        if not problem.has_motion:
+    if len(settings) > (_MAX_READING_REFITS if objective.exact else _MAX_MOTION_REFITS):
+        z = _step(objective, minimum, kept, slopes)
+        if objective.exact:
             return replace(minimum, z=z, residuals=shifted_errors(minimum.residuals, all_slopes, z - minimum.z))
     else:
-        subset = problem.subset(kept)
+        subset = Objective(objective.function.subset(kept), objective.stop)
         # Of few independent samples no step would be worth its run, and the refit would stay where it starts.
         count = sum(w * np.count_nonzero(rows) for w, rows in zip(minimum.weights, kept, strict=True))
         weights = minimum.weights * max(1.0, _LEAST_COUNT / count)
         z = fit(subset, minimum.z, weights=weights, loss=loss, slopes=slopes, least_gain=GAIN_REFIT).z
-        problem.evaluations += subset.evaluations
-    return fit(problem, z, fixed=dict(enumerate(z)), weights=minimum.weights)
+        objective.evaluations += subset.evaluations
+    return fit_at(objective, z, minimum.weights)
 
 
 def shifted_errors(errors: Sequence[Array], slopes: Sequence[Array], shift: Array) -> list[Array]:
@@ -162,38 +159,32 @@ def shifted_errors(errors: Sequence[Array], slopes: Sequence[Array], shift: Arra
     return [e + j @ shift for e, j in zip(errors, slopes, strict=True)]
 
 
-def refitted_errors(problem: Problem, z: Array, errors: Sequence[Array], places: Sequence[Array]) -> list[list[Array]]:
+def refitted_errors(
+    function: Residuals, z: Array, errors: Sequence[Array], places: Sequence[Array]
+) -> list[list[Array]]:
     """Return the errors of every signal at the places of refits, of many of readings to first order as their refits.
 
     Args:
-        problem: Of the signals.
+        function: Of the signals.
         z: The estimate.
         errors: At the estimate, of every signal, shape (m,) each.
         places: z of every refit; one where a motion fails is left out.
     """
-    if not problem.has_motion and len(places) > _MAX_READING_REFITS:
-        slopes = problem.error_slopes(z)
+    if function.exact and len(places) > _MAX_READING_REFITS:
+        slopes = function.error_slopes(z)
         return [shifted_errors(errors, slopes, place - z) for place in places]
-    computed = [problem.errors(place) for place in places]
+    computed = [function.errors(place) for place in places]
     return [each for each in computed if all(np.isfinite(e).all() for e in each)]
 
 
-def _step(problem: Problem, minimum: Fit, kept: Setting, slopes: Sequence[Array]) -> Array:
+def _step(objective: Objective[Residuals], minimum: Fit, kept: Setting, slopes: Sequence[Array]) -> Array:
     """Return the place to which a step of Gauss and Newton leads with some of the samples, within the bounds."""
-    low, high = problem.box
+    low, high = objective.box
     rows = zip(np.sqrt(minimum.weights) / minimum.noise, slopes, minimum.residuals, kept, strict=True)
     stacked = np.concatenate([factor * np.column_stack([j, e[mask]]) for factor, j, e, mask in rows])
     lower, upper = np.minimum(low - minimum.z, -1e-12), np.maximum(high - minimum.z, 1e-12)
     step = lsq_linear(stacked[:, :-1], -stacked[:, -1], (lower, upper), method="bvls").x
-    return problem.feasible(np.clip(minimum.z + step, low, high))
-
-
-def cross_validation(settings: Mapping[str, Setting], refits: Sequence[Fit]) -> CrossValidation | None:
-    """Return what refits without one setting each tell; None without settings or where a motion fails."""
-    if not refits or not all(np.isfinite(each.objective) for each in refits):
-        return None
-    by_signal = zip(*(each.residuals for each in refits), strict=True)
-    return CrossValidation(settings, np.array([each.z for each in refits]), [np.stack(each) for each in by_signal])
+    return objective.feasible(np.clip(minimum.z + step, low, high))
 
 
 def _weighted_quantile(values: Array, weights: Array, share: float) -> float:

@@ -15,20 +15,23 @@ from finger_pin.description.loading import ScenarioLike, load_bench
 from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, ScenarioWarning
-from finger_pin.identification.checkpoint import Checkpoint, digest
 from finger_pin.identification.comparison import other_laws
-from finger_pin.identification.estimate import LOSSES, fit
-from finger_pin.identification.models import build_problem
-from finger_pin.identification.motions import GREATEST_TOLERANCE
-from finger_pin.identification.pipeline import FitPipeline, Progress, starting_points
+from finger_pin.identification.parameters.keys import key_in
+from finger_pin.identification.pipeline import FitPipeline
 from finger_pin.identification.prediction import check_predictable, predictions
-from finger_pin.identification.problem import Problem, Stopped
-from finger_pin.identification.recordings import read_recording
+from finger_pin.identification.residuals.models import fitted_residuals
+from finger_pin.identification.residuals.motions import GREATEST_TOLERANCE
+from finger_pin.identification.residuals.recordings import Recording, read_recording
+from finger_pin.identification.residuals.residuals import Residuals
 from finger_pin.identification.result_dataset import result_dataset, write_results
-from finger_pin.identification.scenario_parameters import key_in
+from finger_pin.identification.search.checkpoint import Checkpoint
+from finger_pin.identification.search.gauss_newton import LOSSES
+from finger_pin.identification.search.objective import Objective
+from finger_pin.identification.search.search import Progress
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger, with_finger
 from finger_pin.studies.fingerprint import digest as content_digest
 from finger_pin.typing import Array
+from finger_pin.version import __version__
 
 Data = Mapping[str, Mapping[str, Any]]
 
@@ -102,78 +105,53 @@ def identify(
     custom_finger = resolve_finger(finger, scenario)
     scenario = with_finger(scenario, custom_finger)
     recorded = [read_recording(name, each, (data or {}).get(name)) for name, each in settings.recordings.items()]
-    problem = build_problem(scenario, settings, recorded, custom_finger)
+    residuals = fitted_residuals(scenario, settings, recorded, custom_finger)
     held_out = [each for each in recorded if each.settings.held_out is not False]
     # Before any work: an entry that is wrong in them is refused now.
-    other_laws(problem, settings)
+    other_laws(residuals, settings)
     check_predictable(scenario, held_out, custom_finger)
-    for message in _model_warnings(problem, scenario):
+    for message in _model_warnings(residuals):
         warnings.warn(message, ScenarioWarning, stacklevel=2)
-    problem.stop = CancelToken(stop)
-    request = digest(
-        scenario,
-        settings,
-        recorded,
-        (starts, seed, loss, *([] if custom_finger is None else [content_digest(custom_finger)])),
-    )
+    objective = Objective(residuals, CancelToken(stop))
+    request = digest(scenario, settings, recorded, starts, seed, loss, custom_finger)
     with Checkpoint(None if output is None else Path(output), request, restart) as checkpoint:
-        pipeline = FitPipeline(problem, checkpoint, loss, progress)
-        result = _run_pipeline(
-            problem, settings, starting_points(problem, starts, seed), starts, pipeline, profiles, refits
-        )
-        result.attrs["ringing"] = _ringing(problem, pipeline.best.z)
+        pipeline = FitPipeline(objective, checkpoint, loss, progress)
+        unfinished = pipeline.run(settings, starts, seed, profiles, refits)
+        result = result_dataset(pipeline, unfinished)
+        result.attrs["ringing"] = _ringing(residuals, pipeline.best.z)
         result.attrs["profiles"], result.attrs["refits"] = int(profiles), int(refits)
         result.attrs["custom_finger"] = int(custom_finger is not None)
         result.update(predictions(result, scenario, held_out, recorded, custom_finger))
         result.attrs["bench"] = bench.name if isinstance(bench, Scenario) else str(bench)
         if output is not None:
-            write_results(result, Path(output), bench, problem)
+            write_results(result, Path(output), bench, residuals)
     return result
 
 
-def _model_warnings(problem: Problem, scenario: Scenario) -> Iterator[str]:
+def digest(scenario: Scenario, settings: IdentifySettings, recordings: Sequence[Recording], *options: Any) -> str:
+    """Return the digest of an identification: scenario, table, data, options, version."""
+    data = [(each.inputs, each.outputs, each.time, each.speed) for each in recordings]
+    return content_digest((__version__, scenario, settings, data, options))
+
+
+def _model_warnings(residuals: Residuals) -> Iterator[str]:
     """Yield warnings: of the first window of every recording that has any, and of too coarse tolerances."""
-    for name in dict.fromkeys(each.recording.name for each in problem.models):
-        keys = [key_in(key, name) for key in problem.keys]
-        messages = (each.warnings(keys) for each in problem.models if each.recording.name == name)
+    for name in dict.fromkeys(each.recording.name for each in residuals.models):
+        keys = [key_in(key, name) for key in residuals.parameters.keys]
+        messages = (each.warnings(keys) for each in residuals.models if each.recording.name == name)
         yield from next(filter(None, messages), [])
-    for name in ("rtol", "atol_scale") if problem.has_motion else ():
-        tolerance = getattr(scenario.simulation, name)
+    for name in () if residuals.exact else ("rtol", "atol_scale"):
+        tolerance = getattr(residuals.scenario.simulation, name)
         if tolerance > GREATEST_TOLERANCE:
             coarse = f"simulation.{name} = {tolerance:g}: slopes of such runs may err by as much as themselves"
             yield f"{coarse}; {GREATEST_TOLERANCE:g} or less is fine enough"
 
 
-def _run_pipeline(
-    problem: Problem,
-    settings: IdentifySettings,
-    points: Sequence[Array],
-    starts: int,
-    pipeline: FitPipeline,
-    profiles: bool,
-    refits: bool,
-) -> xr.Dataset:
-    unfinished = ""
-    try:
-        pipeline.search(pipeline.screen_starts(points, starts))
-        (pipeline.profile_all if profiles else pipeline.linearise)(pipeline.best)
-        if refits:
-            pipeline.cross_validate()
-        pipeline.find_open_directions(refits)
-        pipeline.compare(settings)
-    except Stopped:
-        unfinished = "interrupted: the best so far, and the intervals that are finished"
-        problem.stop = lambda: False
-        if not pipeline.fits:
-            point = problem.best[1] if len(problem.best[1]) else problem.start
-            pipeline.fits.append(fit(problem, point, fixed=dict(enumerate(point))))
-    return result_dataset(problem, pipeline, unfinished)
-
-
-def _ringing(problem: Problem, z: Array) -> str:
+def _ringing(residuals: Residuals, z: Array) -> str:
     """Return the first warning about what rings in the motions at a place of the search; empty without any."""
-    runs = zip(problem.models, problem.scenario_maps(), strict=True)
-    return next(filter(None, (model.ringing(*scenario_map(problem.values(z))) for model, scenario_map in runs)), "")
+    values = residuals.parameters.values(z)
+    said = (model.ringing(*scenario_map(values)) for model, scenario_map in residuals.maps)
+    return next(filter(None, said), "")
 
 
 def _as_builtin(value: Any) -> Any:

@@ -6,14 +6,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from finger_pin.identification.estimate import GAIN_REFIT, Fit, fit, information
-from finger_pin.identification.problem import Problem
+from finger_pin.identification.search.gauss_newton import GAIN_REFIT, Fit, fit, information
+from finger_pin.identification.search.objective import Objective
 from finger_pin.typing import Array
 
 #: Rise of minus twice the log-likelihood at the ends of an interval: 95 % of chi-squared with one degree of freedom.
@@ -45,27 +45,26 @@ class ProfileBound:
     lower_minimum: Fit | None = None
 
 
-def covariance(problem: Problem, minimum: Fit) -> Array:
+def covariance(objective: Objective[Any], minimum: Fit) -> Array:
     """Return the linearised covariance of z, shape (p, p)."""
-    return inverse_within_bounds(problem, information(problem, minimum))
+    return inverse_within_bounds(objective, information(objective, minimum))
 
 
-def inverse_within_bounds(problem: Problem, fisher_information: Array) -> Array:
+def inverse_within_bounds(objective: Objective[Any], fisher_information: Array) -> Array:
     """Return the covariance of z by an information, shape (p, p); no direction is less sure than bounds are wide."""
-    values, vectors, size = _directions(problem, fisher_information)
+    values, vectors, size = _directions(objective, fisher_information)
     return np.asarray((vectors / np.maximum(values, 1.0)) @ vectors.T * size)
 
 
-def information_of_bounds(problem: Problem, minimum: Fit) -> Array:
+def information_of_bounds(objective: Objective[Any], minimum: Fit) -> Array:
     """Return the information of z that bounds add to that of the recordings, shape (p, p)."""
-    values, vectors, size = _directions(problem, information(problem, minimum))
+    values, vectors, size = _directions(objective, information(objective, minimum))
     return np.asarray((vectors * np.maximum(1.0 - values, 0.0)) @ vectors.T / size)
 
 
-def _directions(problem: Problem, fisher_information: Array) -> tuple[Array, Array, Array]:
+def _directions(objective: Objective[Any], fisher_information: Array) -> tuple[Array, Array, Array]:
     """Return eigenvalues and eigenvectors of scaled information, and the products of ranges that scale it."""
-    width = np.subtract(*reversed(problem.box))
-    size = np.outer(width, width)
+    size = np.outer(objective.width, objective.width)
     return *np.linalg.eigh(fisher_information * size), size
 
 
@@ -77,7 +76,7 @@ class SmallSample:
         variance: Factors on the variance of every parameter for the same 95 % of a normal distribution, shape (p,).
         level: Rise of minus twice the likelihood at an end of each interval, shape (p,).
         noise: Factors on the noise of every signal, for 95 % of further readings, shape (s,).
-        pooled_noise: The same on the mean square of the noises of a name, for readings of other recordings, shape (s,).
+        pooled_noise: The same on the mean square of the noises of a kind, for readings of other recordings, shape (s,).
     """
 
     variance: Array
@@ -86,96 +85,93 @@ class SmallSample:
     pooled_noise: Array
 
     @classmethod
-    def from_fit(cls, problem: Problem, minimum: Fit, covariance: Array) -> Self:
+    def from_fit(cls, objective: Objective[Any], minimum: Fit, covariance: Array) -> Self:
         """Return the corrections at a minimum with a covariance by the likelihood alone.
 
         Each output has its samples less its effective number of parameters (the trace of its part of the information)
         as degrees of freedom, and a parameter the degrees of freedom of Satterthwaite (Biometrics Bulletin 2, 1946).
         """
-        slopes, first = problem.slopes(minimum.z), np.unique(problem.noise_groups, return_index=True)[1]
+        slopes, noises = objective.slopes(minimum.z), objective.likelihood.noises
+        first = np.unique(noises, return_index=True)[1]
         parts = np.zeros((len(first), *covariance.shape))
-        for group, w, n, j in zip(problem.noise_groups, minimum.weights, minimum.noise, slopes, strict=True):
+        for group, w, n, j in zip(noises, minimum.weights, minimum.noise, slopes, strict=True):
             parts[group] += w / n**2 * j.T @ j
         effective_parameters = np.einsum("kl,glk->g", covariance, parts)
-        counts = _SampleCounts.from_fit(problem, minimum, slopes)
-        ratio, freedom_left = counts.corrections(effective_parameters)
+        counts = _sample_counts(noises, minimum, slopes)
+        ratio, freedom_left = _corrections(counts, effective_parameters)
         variances = np.einsum("kl,glm,mk->gk", covariance, parts, covariance)
         corrected = variances * ratio[:, None]
         total, corrected_total = np.maximum([variances.sum(axis=0), corrected.sum(axis=0)], 1e-300)
         square_total = np.maximum(np.sum(corrected**2 / freedom_left[:, None], axis=0), 1e-300)
         freedom = np.maximum(corrected_total**2 / square_total, 1.0)
         factor, quantile = corrected_total / total, student.ppf(0.975, freedom)
-        names = np.array([signal.name for signal in problem.signals])[first]
-        pooled = counts.pooled(names, minimum.noise[first] ** 2, effective_parameters)
+        kinds, squares = objective.likelihood.kinds[first], minimum.noise[first] ** 2
+        pooled = _pooled_corrections(counts, kinds, squares, effective_parameters)
         noise, pooled_noise = (np.sqrt(q / CHI2_95) * student.ppf(0.975, f) for q, f in ((ratio, freedom_left), pooled))
         return cls(
             factor * quantile**2 / CHI2_95,
             factor * freedom * np.log1p(quantile**2 / freedom),
-            noise[problem.noise_groups],
-            pooled_noise[problem.noise_groups],
+            noise[noises],
+            pooled_noise[noises],
         )
 
 
-@dataclass(frozen=True, eq=False)
-class _SampleCounts:
-    """Numbers of samples of every output, shape (g,).
+def _sample_counts(noises: NDArray[np.intp], minimum: Fit, slopes: Sequence[Array]) -> Array:
+    """Return the numbers of samples of every noise, of those that count for a mean, and for a variance, shape (3, g).
 
-    Of n samples that follow each other by rho fewer count: n (1 - rho) / (1 + rho) for a mean, and for a variance
-    n (1 - rho^2) / (1 + rho^2) (Bartlett, J. Roy. Stat. Soc. B 8, 1946).
-
-    Attributes:
-        size: Number of all samples.
-        of_mean: Those that count for a mean, and for parameters.
-        of_variance: Those that count for a variance.
+    Of n samples that follow each other by rho fewer count: n (1 - rho) / (1 + rho) for a mean, and for parameters, and
+    for a variance n (1 - rho^2) / (1 + rho^2) (Bartlett, J. Roy. Stat. Soc. B 8, 1946).
     """
+    size = np.array([len(j) for j in slopes], dtype=float)
+    shares = (1.0 - minimum.correlation**2) / (1.0 + minimum.correlation**2)
+    counts = np.zeros((3, int(noises.max()) + 1))
+    np.add.at(counts.T, noises, np.stack([size, size * minimum.weights, size * shares], axis=1))
+    return counts
 
-    size: Array
-    of_mean: Array
-    of_variance: Array
 
-    @classmethod
-    def from_fit(cls, problem: Problem, minimum: Fit, slopes: Sequence[Array]) -> Self:
-        """Return the numbers of samples at a minimum."""
-        size = np.array([len(j) for j in slopes], dtype=float)
-        shares = (1.0 - minimum.correlation**2) / (1.0 + minimum.correlation**2)
-        counts = np.zeros((3, int(problem.noise_groups.max()) + 1))
-        np.add.at(counts.T, problem.noise_groups, np.stack([size, size * minimum.weights, size * shares], axis=1))
-        return cls(*counts)
+def _corrections(counts: Array, parameters: Array) -> tuple[Array, Array]:
+    """Return factors on variances that parameters have lessened, and their degrees of freedom.
 
-    def corrections(self, parameters: Array) -> tuple[Array, Array]:
-        """Return factors on variances that parameters have lessened, and their degrees of freedom.
+    What a model lacks is no noise that further recordings draw anew, though its correlation leaves few independent
+    samples: parameters take at most half of these, and no fewer than four are left if there are as many samples, of
+    which Student's t is 1.4 times that of many.
+    """
+    size, of_mean, of_variance = counts
+    share, least_share = (1.0 - parameters / np.maximum(each, 1e-300) for each in (of_mean, size))
+    share = np.maximum(share, np.minimum(0.5, np.maximum(least_share, 1.0 / np.maximum(size, 1.0))))
+    least_freedom = np.maximum(np.minimum(LEAST_FREEDOM, size - parameters), 1.0)
+    return 1.0 / share, np.maximum(of_variance * share, least_freedom)
 
-        What a model lacks is no noise that further recordings draw anew, though its correlation leaves few independent
-        samples: parameters take at most half of these, and no fewer than four are left if there are as many samples, of
-        which Student's t is 1.4 times that of many.
-        """
-        share, least_share = (1.0 - parameters / np.maximum(each, 1e-300) for each in (self.of_mean, self.size))
-        share = np.maximum(share, np.minimum(0.5, np.maximum(least_share, 1.0 / np.maximum(self.size, 1.0))))
-        least_freedom = np.maximum(np.minimum(LEAST_FREEDOM, self.size - parameters), 1.0)
-        return 1.0 / share, np.maximum(self.of_variance * share, least_freedom)
 
-    def pooled(self, names: NDArray[np.str_], squares: Array, parameters: Array) -> tuple[Array, Array]:
-        """Return the corrections of the mean of the variances of each name, of recordings that were not fitted.
+def _pooled_corrections(
+    counts: Array, kinds: NDArray[np.intp], squares: Array, parameters: Array
+) -> tuple[Array, Array]:
+    """Return the corrections of the mean of the variances of each kind, of recordings that were not fitted.
 
-        Samples that follow each other are hardly more than one, so that one recording tells its noise badly: the mean
-        of several has their degrees of freedom (Satterthwaite).
-        """
-        same_name = (names[:, None] == names).astype(float)
-        sums = _SampleCounts(*(same_name @ each for each in (self.size, self.of_mean, self.of_variance)))
-        ratio, freedom = sums.corrections(same_name @ parameters)
-        square_total = same_name @ (squares**2 / np.maximum(self.of_variance, 1e-300))
-        unequal = (same_name @ squares) ** 2 / (ratio * square_total)
-        return ratio, np.maximum(unequal, np.minimum(LEAST_FREEDOM, freedom))
+    Samples that follow each other are hardly more than one, so that one recording tells its noise badly: the mean of
+    several has their degrees of freedom (Satterthwaite).
+    """
+    same_kind = (kinds[:, None] == kinds).astype(float)
+    ratio, freedom = _corrections(np.array([same_kind @ each for each in counts]), same_kind @ parameters)
+    square_total = same_kind @ (squares**2 / np.maximum(counts[2], 1e-300))
+    unequal = (same_kind @ squares) ** 2 / (ratio * square_total)
+    return ratio, np.maximum(unequal, np.minimum(LEAST_FREEDOM, freedom))
 
 
 def profile(
-    problem: Problem, minimum: Fit, k: int, side: int, covariance: Array, loss: str = "linear", inflation: float = 1.0
+    objective: Objective[Any],
+    minimum: Fit,
+    k: int,
+    side: int,
+    covariance: Array,
+    loss: str = "linear",
+    inflation: float = 1.0,
 ) -> ProfileBound:
     """Return the end of the interval of parameter k on one side, 2 (l* - l(p_k)) = 3.841 times an inflation.
 
     Args:
-        problem: The problem that was fitted.
-        minimum: Of the problem.
+        objective: The objective that was fitted.
+        minimum: Of the objective.
         k: Which parameter.
         side: 1 for the upper end, -1 for the lower.
         covariance: Covariance of z.
@@ -183,7 +179,7 @@ def profile(
         inflation: Variance of the parameter over that by the likelihood (Pace, Salvan and Sartori, Statistica Sinica
             21, 2011), and over that of few readings; rises of the path are divided by it.
     """
-    low, high = problem.box
+    low, high = objective.box
     limit = high[k] if side > 0 else low[k]
     room = abs(limit - minimum.z[k])
     deviation = math.sqrt(max(inflation * covariance[k, k], 0.0))
@@ -191,13 +187,13 @@ def profile(
     path = [(float(minimum.z[k]), 0.0)]
     distance = min(room, max(math.sqrt(CHI2_95) * deviation, 1e-6 * (high[k] - low[k])))
     inner, outer = (0.0, 0.0), (math.inf, math.inf)
-    slopes: Sequence[Array] = problem.slopes(minimum.z)
+    slopes: Sequence[Array] = objective.slopes(minimum.z)
     # The farthest place within the interval: refits start there, not from one beyond that may have failed.
     inner_fit, end = minimum, math.inf * side
     for _ in range(_MAX_REFITS if room > 1e-9 * (high[k] - low[k]) else 0):
         value = minimum.z[k] + side * distance
         guess = np.clip(inner_fit.z + direction * (value - inner_fit.z[k]), low, high)
-        known = partial(fit, problem, weights=minimum.weights, scale=minimum.noise, loss=loss, least_gain=GAIN_REFIT)
+        known = partial(fit, objective, weights=minimum.weights, scale=minimum.noise, loss=loss, least_gain=GAIN_REFIT)
         refit = partial(known, fixed={k: value})
         refitted = refit(guess, slopes=slopes)
         if not refitted.converged and math.isfinite(refitted.objective):

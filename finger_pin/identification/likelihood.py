@@ -1,118 +1,93 @@
-"""Likelihood of residuals with a noise for each output."""
+"""Likelihood of residuals of signals whose noises are found with them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from finger_pin.exceptions import InputError
-from finger_pin.identification.recordings import RecordedSignal
 from finger_pin.typing import Array
 
 # Median magnitude of a standard normal variable.
 _NORMAL_MEDIAN = float(norm.ppf(0.75))
+# Least noise by rounding, part of the largest reading.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class NoiseGrowth:
-    """Noise of signals that grows with their readings x: sigma = sigma_0 w(x), w^2 = 1 + (share x / least)^2.
-
-    With residuals e / w times G, the geometric mean of w in a group of signals, n log(SSE / n) is minus twice the
-    log-likelihood again, whose logarithm of all sigma would else be missing: readings are those that are computed, as
-    measured ones would count for more where they are too small by chance.
+class Likelihood:
+    """Likelihood of the residuals of s signals, with a noise for each group of them.
 
     Attributes:
-        measured: Readings of every signal.
-        least_noise: Least noise of every signal, shape (s,).
-        noise_share: Part of the reading, shape (s,).
-        groups: Group of every signal, shape (s,).
+        noises: Number of the noise of each signal, shape (s,).
+        least_noise: Least standard deviation of each, shape (s,).
+        outputs: Number of the output of each, whose windows are several signals, shape (s,).
+        kinds: Number of what each measures, whatever the recording, shape (s,).
+        largest: Largest magnitude of the readings of each, shape (s,).
+        ordered: Whether samples of each follow each other, so that neighbours may err alike, shape (s,).
     """
 
-    measured: Sequence[Array]
+    noises: NDArray[np.intp]
     least_noise: Array
-    noise_share: Array
-    groups: NDArray[np.intp]
-
-    @classmethod
-    def from_signals(cls, signals: Sequence[RecordedSignal], groups: NDArray[np.intp]) -> Self:
-        """Return the growth of the noise of recorded signals."""
-        least_noise, noise_share = np.array([(each.least_noise, each.noise_share) for each in signals]).reshape(-1, 2).T
-        return cls([each.measured for each in signals], least_noise, noise_share, groups)
+    outputs: NDArray[np.intp]
+    kinds: NDArray[np.intp]
+    largest: Array
+    ordered: NDArray[np.bool_]
 
     @property
-    def floor(self) -> Array:
-        """The least deviation of residuals, shape (s,), by the level of the measured readings."""
-        return self.least_noise * self.levels([0.0 * x for x in self.measured]) if self.active else self.least_noise
+    def first(self) -> list[int]:
+        """The first signal of every output."""
+        return list(map(int, np.unique(self.outputs, return_index=True)[1]))
 
-    @property
-    def _ratios(self) -> Array:
-        zeros = np.zeros_like(self.noise_share)
-        return np.divide(self.noise_share, self.least_noise, out=zeros, where=self.noise_share > 0.0)
+    def minus_twice_log(self, residuals: Sequence[Array], weights: Array | None = None) -> float:
+        """Return `minus_twice_likelihood` of residuals, with equal weights by default."""
+        equal = np.ones(len(residuals))
+        return minus_twice_likelihood(residuals, equal if weights is None else weights, self.noises, self.least_noise)
 
-    @property
-    def active(self) -> bool:
-        """Whether the noise of any output grows with its reading."""
-        return bool(np.any(self.noise_share))
+    def noise(self, residuals: Sequence[Array], robust: bool = False) -> Array:
+        """Return the rms of the residuals of every noise, or that of their median, shape (s,); never below its least.
 
-    def growth(self, errors: Sequence[Array]) -> list[Array]:
-        """Return w at the computed readings, which are measured less errors."""
-        readings = zip(self._ratios, self.measured, errors, strict=True)
-        return [np.sqrt(1.0 + (ratio * (x - e)) ** 2) if ratio else np.ones_like(x) for ratio, x, e in readings]
+        Rounding is a noise, too.
+        """
+        count, square = pooled_variance(residuals, np.ones(len(residuals)), self.noises)
+        rms = self.deviation(residuals) if robust else np.where(count > 0.0, np.sqrt(square), 1.0)[self.noises]
+        return np.maximum(rms, np.maximum(self.least_noise, _ROUNDING * np.maximum(self.largest, _ROUNDING)))
 
-    def levels(self, errors: Sequence[Array]) -> Array:
-        """Return G of every signal, shape (s,)."""
-        return np.exp(self._grouped_means([np.log(w) for w in self.growth(errors)]))
+    def deviation(self, residuals: Sequence[Array]) -> Array:
+        """Return the deviation of every noise by the median of its residuals, which outliers hardly change."""
+        pairs = list(zip(residuals, self.noises, strict=True))
+        sizes = [np.abs(np.concatenate([e for e, g in pairs if g == k])) for k in self.noises]
+        return np.array([np.median(each) / _NORMAL_MEDIAN if len(each) else 1.0 for each in sizes])
 
-    def weigh(self, errors: Sequence[Array]) -> list[Array]:
-        """Return the residuals G e / w."""
-        rows = zip(self.levels(errors), self.growth(errors), errors, strict=True)
-        return [level / w * e for level, w, e in rows]
+    def independence(self, residuals: Sequence[Array]) -> tuple[Array, Array]:
+        """Return the correlation of neighbouring residuals of every output, and the share that is independent.
 
-    def weigh_slopes(self, errors: Sequence[Array], slopes: Sequence[Array]) -> list[Array]:
-        """Return the derivatives of the residuals from those of the errors, shape (m, p) each."""
-        rows = list(zip(self.levels(errors), self.growth(errors), self.measured, errors, slopes, strict=True))
-        # Of log w, as what is computed falls where the error rises.
-        by_log = [-((k / w) ** 2 * (x - e))[:, None] * j for k, (_, w, x, e, j) in zip(self._ratios, rows, strict=True)]
-        means = self._grouped_means(by_log)
-        pairs = zip(rows, by_log, means, strict=True)
-        return [(g / w)[:, None] * (j + e[:, None] * (mean - log)) for (g, w, _, e, j), log, mean in pairs]
+        That is (1 - rho) / (1 + rho) (Bartlett); both have shape (s,).
+        """
+        rho = np.zeros(len(residuals))
+        for output in np.unique(self.outputs):
+            places = np.flatnonzero(self.outputs == output).tolist()
+            ordered = [residuals[k] for k in places if self.ordered[k] and len(residuals[k]) > 2]
+            square = sum(float(e @ e) for e in ordered)
+            product = sum(float(e[1:] @ e[:-1]) for e in ordered)
+            if square > 0.0:
+                rho[places] = np.clip(product / square, 0.0, 1.0 - 2.0 / sum(map(len, ordered)))
+        return rho, (1.0 - rho) / (1.0 + rho)
 
-    def _grouped_means(self, values: Sequence[Array]) -> Array:
-        """Return the mean of all values of its group for every signal."""
-        count = np.bincount(self.groups, [len(v) for v in values])
-        sums = np.array([np.sum(v, axis=0) for v in values])
-        totals = np.zeros((len(count), *sums.shape[1:]))
-        np.add.at(totals, self.groups, sums)
-        return np.asarray((totals.T / np.maximum(count, 1)).T[self.groups])
+    def pooled(self, noise: Array) -> Array:
+        """Return the root mean square of the noises of all outputs of a kind, for every signal, shape (s,)."""
+        kinds = self.kinds[self.first]
+        return np.array([np.sqrt(np.mean(noise[self.first][kinds == kind] ** 2)) for kind in self.kinds])
 
 
 def numbered(names: Sequence[Any]) -> NDArray[np.intp]:
     """Return the number of each name among those that differ, in their order."""
     order = list(dict.fromkeys(names))
     return np.array([order.index(name) for name in names], dtype=np.intp)
-
-
-def noise_groups(signals: Sequence[RecordedSignal]) -> NDArray[np.intp]:
-    """Return the number of the noise of every signal: that of its output, or one that several outputs share.
-
-    Raises:
-        InputError: If outputs share a noise, and differ in unit or in what is said of it.
-    """
-    first: dict[str, RecordedSignal] = {}
-    for signal in signals:
-        other = first.setdefault(signal.shared_noise, signal) if signal.shared_noise else signal
-        for what in ("unit", "least_noise", "noise_share"):
-            value, expected = getattr(signal, what), getattr(other, what)
-            if value != expected:
-                entry = f"identify.recordings.{signal.recording}.outputs.{signal.name}.noise"
-                allowed = f"is shared with {other.recording}.{other.name}, whose {what} is {expected}, not {value}"
-                raise InputError(entry, allowed, signal.shared_noise)
-    return numbered([(each.shared_noise,) if each.shared_noise else (each.recording, each.name) for each in signals])
 
 
 def pooled_variance(residuals: Sequence[Array], weights: Array, groups: NDArray[np.intp]) -> tuple[Array, Array]:
@@ -122,12 +97,6 @@ def pooled_variance(residuals: Sequence[Array], weights: Array, groups: NDArray[
         count[group] += w * len(e)
         squares[group] += w * float(e @ e)
     return count, squares / np.maximum(count, 1e-300)
-
-
-def robust_deviation(residuals: Sequence[Array], groups: NDArray[np.intp]) -> Array:
-    """Return the deviation of the residuals of every signal's output by their median, which outliers hardly change."""
-    sizes = [np.abs(np.concatenate([e for e, g in zip(residuals, groups, strict=True) if g == k])) for k in groups]
-    return np.array([np.median(each) / _NORMAL_MEDIAN if len(each) else 1.0 for each in sizes])
 
 
 def minus_twice_likelihood(
@@ -145,9 +114,3 @@ def minus_twice_likelihood(
     value = np.sum(count[sampled] * np.log(np.maximum(np.maximum(square, least)[sampled], 1e-300)))
     at_least_noise = sampled & (square < least)
     return float(value + np.sum(count[at_least_noise] * (square[at_least_noise] / least[at_least_noise] - 1.0)))
-
-
-def block_means(values: Sequence[Array], counts: Sequence[int]) -> list[Array]:
-    """Return means of consecutive samples."""
-    pairs = zip(values, counts, strict=True)
-    return [e[: len(e) // n * n].reshape(-1, n, *e.shape[1:]).mean(axis=1) for e, n in pairs]

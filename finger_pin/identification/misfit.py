@@ -13,11 +13,11 @@ from scipy.signal import lfilter
 from scipy.stats import f as f_distribution
 from scipy.stats import t as student
 
-from finger_pin.identification.estimate import Fit
 from finger_pin.identification.intervals import information_of_bounds
-from finger_pin.identification.likelihood import robust_deviation
-from finger_pin.identification.problem import Problem
-from finger_pin.identification.recordings import RecordedSignal, Recording
+from finger_pin.identification.residuals.recordings import RecordedSignal, Recording
+from finger_pin.identification.residuals.residuals import Residuals
+from finger_pin.identification.search.gauss_newton import Fit
+from finger_pin.identification.search.objective import Objective
 from finger_pin.typing import Array
 
 # Probability below which a misfit is significant, and the greatest order of the autoregression of residuals.
@@ -41,7 +41,7 @@ class Repeats:
     p_value: float
 
 
-def sandwich_covariance(problem: Problem, minimum: Fit, covariance: Array) -> Array:
+def sandwich_covariance(objective: Objective[Residuals], minimum: Fit, covariance: Array) -> Array:
     """Return the covariance of z with residuals correlated as they are, shape (p, p).
 
     The estimate weighs samples as if they were independent but for their share; its covariance H^-1 V H^-1 has V of
@@ -49,18 +49,18 @@ def sandwich_covariance(problem: Problem, minimum: Fit, covariance: Array) -> Ar
     what the model misses shared by repeats.
 
     Args:
-        problem: The problem that was fitted.
-        minimum: Of the problem.
+        objective: The objective that was fitted.
+        minimum: Of the objective.
         covariance: Covariance by the likelihood alone, H^-1, shape (p, p).
     """
-    slopes = problem.slopes(minimum.z)
+    slopes, function, outputs = objective.slopes(minimum.z), objective.function, objective.likelihood.outputs
     scores = [w / n**2 * j for w, n, j in zip(minimum.weights, minimum.noise, slopes, strict=True)]
-    total, repeated_signals = information_of_bounds(problem, minimum), set[int]()
-    for repeated in repeats(problem, minimum.residuals):
+    total, repeated_signals = information_of_bounds(objective, minimum), set[int]()
+    for repeated in repeats(function, minimum.residuals):
         if repeated.shared_misfit == 0.0:
             continue
         repeated_signals.update(repeated.signals)
-        members = [problem.signals[k] for k in repeated.signals]
+        members = [function.signals[k] for k in repeated.signals]
         # Residuals below the least noise count as that noise.
         floor_factor = max(1.0, members[0].least_noise ** 2 / (repeated.shared_misfit + repeated.scatter))
         shared_square, scatter_square = floor_factor * repeated.shared_misfit, floor_factor * repeated.scatter
@@ -76,40 +76,40 @@ def sandwich_covariance(problem: Problem, minimum: Fit, covariance: Array) -> Ar
             sums = np.zeros((replicate.max() + 1, score.shape[1]))
             np.add.at(sums, replicate, score)
             total += shared_square * sums.T @ sums + scatter_square * score.T @ score
-    for group in np.unique(problem.groups):
-        unrepeated = [k for k in np.flatnonzero(problem.groups == group).tolist() if k not in repeated_signals]
-        autoregression = _autoregression([minimum.residuals[k] for k in unrepeated if problem.signals[k].ordered])
+    for group in np.unique(outputs):
+        unrepeated = [k for k in np.flatnonzero(outputs == group).tolist() if k not in repeated_signals]
+        autoregression = _autoregression([minimum.residuals[k] for k in unrepeated if function.signals[k].ordered])
         total += sum(minimum.noise[k] ** 2 * _correlated_information(scores[k], autoregression) for k in unrepeated)
     return np.asarray(covariance @ total @ covariance)
 
 
-def outliers(problem: Problem, residuals: Sequence[Array]) -> list[Array]:
+def outliers(function: Residuals, residuals: Sequence[Array]) -> list[Array]:
     """Return residuals over the deviation of their median, by signal; zero for all but outliers.
 
     An outlier is less probable than chance among so many, and alone outweighs all others as they mostly are.
     """
-    ratios, groups = [], problem.noise_groups
-    count = np.bincount(groups, [len(e) for e in residuals])[groups]
-    for e, n, deviation in zip(residuals, count, robust_deviation(residuals, groups), strict=True):
+    ratios, noises = [], function.likelihood.noises
+    count = np.bincount(noises, [len(e) for e in residuals])[noises]
+    for e, n, deviation in zip(residuals, count, function.likelihood.deviation(residuals), strict=True):
         ratio = np.abs(e) / max(deviation, 1e-300)
-        p_value = 2.0 * n * student.sf(ratio, max(n - len(problem.keys), 1.0))
+        p_value = 2.0 * n * student.sf(ratio, max(n - len(function.parameters.keys), 1.0))
         ratios.append(np.where((p_value < SIGNIFICANCE) & (ratio**2 > n), ratio, 0.0))
     return ratios
 
 
-def repeats(problem: Problem, residuals: Sequence[Array]) -> list[Repeats]:
+def repeats(function: Residuals, residuals: Sequence[Array]) -> list[Repeats]:
     """Return the repeated runs and readings among the signals, with their misfit."""
     repeated, runs = [], list[list[int]]()
-    recordings = {model.recording.name: model.recording for model in problem.models}
-    for k, signal in enumerate(problem.signals):
+    recordings = {model.recording.name: model.recording for model in function.models}
+    for k, signal in enumerate(function.signals):
         if signal.ordered:
-            matching = [run for run in runs if _are_repeated_runs(problem.signals[run[0]], signal, recordings)]
+            matching = [run for run in runs if _are_repeated_runs(function.signals[run[0]], signal, recordings)]
             if matching:
                 matching[0].append(k)
             else:
                 runs.append([k])
         elif signal.replicate.max(initial=-1) + 1 < len(signal.measured):
-            repeated.append(_reading_repeats(k, signal.replicate, residuals[k], len(problem.keys)))
+            repeated.append(_reading_repeats(k, signal.replicate, residuals[k], len(function.parameters.keys)))
     repeated += [_run_repeats(tuple(run), [residuals[k] for k in run]) for run in runs if len(run) > 1]
     return repeated
 
@@ -135,9 +135,7 @@ def _reading_repeats(k: int, replicate: NDArray[np.intp], residual: Array, param
     inner_freedom, outer_freedom = len(residual) - len(count), max(len(count) - parameters, 1)
     within = scatter(residual, replicate)
     between = float(np.sum(count * mean**2)) / outer_freedom
-    p_value = float(f_distribution.sf(between / max(within, 1e-300), outer_freedom, inner_freedom))
-    shared_misfit = max(between - within, 0.0) / float(np.mean(count))
-    return Repeats((k,), within, shared_misfit if p_value < SIGNIFICANCE else 0.0, p_value)
+    return _repeats((k,), within, between, float(np.mean(count)), outer_freedom, inner_freedom)
 
 
 def _run_repeats(signals: tuple[int, ...], residuals: Sequence[Array]) -> Repeats:
@@ -150,8 +148,13 @@ def _run_repeats(signals: tuple[int, ...], residuals: Sequence[Array]) -> Repeat
     rho = sum(float(each[1:] @ each[:-1]) for each in deviations) / max(square, 1e-300)
     independent = max(len(mean) * (1.0 - rho**2) / (1.0 + rho**2), 1.0)
     between = runs * float(np.mean(mean**2))
-    p_value = float(f_distribution.sf(between / max(within, 1e-300), independent, (runs - 1) * independent))
-    shared_misfit = max(between - within, 0.0) / runs
+    return _repeats(signals, within, between, runs, independent, (runs - 1) * independent)
+
+
+def _repeats(signals: tuple[int, ...], within: float, between: float, count: float, *freedoms: float) -> Repeats:
+    """Return repeats with mean squares within groups of some size and between them, by the F test."""
+    p_value = float(f_distribution.sf(between / max(within, 1e-300), *freedoms))
+    shared_misfit = max(between - within, 0.0) / count
     return Repeats(signals, within, shared_misfit if p_value < SIGNIFICANCE else 0.0, p_value)
 
 

@@ -18,10 +18,10 @@ from finger_pin.exceptions import InputError
 from finger_pin.identification.cross_validation import parameter_variance, refitted_errors
 from finger_pin.identification.intervals import NORMAL_95
 from finger_pin.identification.misfit import scatter as scatter_of
-from finger_pin.identification.models import held_out_rows, recording_models
-from finger_pin.identification.problem import Problem
-from finger_pin.identification.recordings import Recording, read_recording
-from finger_pin.identification.scenario_parameters import acts_on, recording_pattern, scenario_key
+from finger_pin.identification.parameters.keys import acts_on, recording_pattern, scenario_key
+from finger_pin.identification.residuals.models import held_out_residuals, held_out_rows
+from finger_pin.identification.residuals.recordings import Recording, read_recording
+from finger_pin.identification.residuals.residuals import Residuals
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
@@ -36,6 +36,14 @@ _TEXTS = {
     "samples": "number of samples",
     "units": "units of the signal",
     "steady": "whether readings, not a motion",
+}
+_SAMPLE_TEXTS = {
+    "index": "which prediction",
+    "instant": "time, s; number of a steady reading",
+    "applied": "what pulls, N",
+    "measured": "measured, in the unit of the signal",
+    "value": "predicted, in the unit of the signal",
+    "band": "half the width of the 95 % band about it",
 }
 
 
@@ -82,12 +90,8 @@ def predict(
 def check_predictable(scenario: Scenario, recordings: Sequence[Recording], finger: Finger | None) -> None:
     """Compute the held-out part of recordings once, under the scenario as it is, before any work."""
     for recording in recordings:
-        models, signals = recording_models(scenario, [recording], finger, [held_out_rows(recording)])
-        if not any(len(signal.measured) for signal in signals):
-            entry = f"identify.recordings.{recording.name}.held_out"
-            raise InputError(entry, "has no samples", recording.settings.held_out)
-        problem = Problem(scenario, (), np.zeros(0), np.zeros(0), models, signals, {})
-        problem.residuals(problem.start)
+        function = held_out_residuals(scenario, {}, recording, finger)
+        function.errors(function.parameters.start)
 
 
 def predictions(
@@ -110,12 +114,12 @@ def predictions(
     fitted = result["applied"].values[np.isfinite(result["applied"].values)]
     lowest, highest = (float(fitted.min()), float(fitted.max())) if len(fitted) else (-math.inf, math.inf)
     for recording in recordings:
-        problem, z, covariance, left_out = _problem(result, scenario, recording, finger)
-        residuals = problem.errors(z)
-        refits = refitted_errors(problem, z, residuals, left_out)
-        growths = problem.growth.growth(residuals)
+        function, z, covariance, left_out = _at_estimate(result, scenario, recording, finger)
+        residuals = function.errors(z)
+        refits = refitted_errors(function, z, residuals, left_out)
+        growths = function.growth.growth(residuals)
         refitted = [np.array([errors[k] for errors in refits]) for k in range(len(residuals))]
-        computed = zip(problem.signals, residuals, problem.error_slopes(z), growths, refitted, strict=True)
+        computed = zip(function.signals, residuals, function.error_slopes(z), growths, refitted, strict=True)
         rows_by_signal: dict[str, list[Array]] = {}
         for signal, residual, slopes, growth, errors in computed:
             noise, factor = _noise(result, recording.name, signal.name)
@@ -124,24 +128,23 @@ def predictions(
             rows = np.stack([signal.instant, signal.load, signal.measured, value, NORMAL_95 * deviation])
             rows_by_signal.setdefault(signal.name, []).append(rows)
         for name, pieces in rows_by_signal.items():
-            first = next(each for each in problem.signals if each.name == name)
+            first = next(each for each in function.signals if each.name == name)
             square = math.nan if first.ordered else scatter_of(first.measured, first.replicate)
             scatter = _repeats(recording, name, all_recordings) if first.ordered else math.sqrt(square)
             rows = np.concatenate(pieces, axis=1)
             # Loads that are not numbers count as inside.
             beyond = float(np.mean((rows[1] < lowest) | (rows[1] > highest)))
             signals.append(
-                {"name": f"{recording.name}.{name}", "unit": first.unit, "steady": not first.ordered}
-                | {"rows": rows, "scatter": scatter, "beyond": beyond}
+                {"name": f"{recording.name}.{name}", "units": first.unit, "steady": not first.ordered}
+                | {"rows": rows, "scatter": scatter, "beyond": beyond, **_statistics(rows)}
             )
     return _dataset(signals) if signals else xr.Dataset()
 
 
-def _problem(
+def _at_estimate(
     result: xr.Dataset, scenario: Scenario, recording: Recording, finger: Finger | None
-) -> tuple[Problem, Array, Array, list[Array]]:
-    """Return the problem of the held-out part of a recording, z, its covariance, and z of refits without a setting."""
-    models, signals = recording_models(scenario, [recording], finger, [held_out_rows(recording)])
+) -> tuple[Residuals, Array, Array, list[Array]]:
+    """Return the residuals of what is held out of a recording, z, its covariance, and z of refits without a setting."""
 
     def applies(key: str) -> bool:
         of_column = scenario_key(key).rpartition(".")[0] in {*recording.inputs, *recording.outputs}
@@ -152,20 +155,20 @@ def _problem(
     estimate, upper, low, high = (
         result[name].values[applicable].astype(float) for name in ("estimate", "linear_upper", "least", "greatest")
     )
-    keys = tuple(str(result["parameter"].values[k]) for k in applicable)
-    problem = Problem(scenario, keys, low, high, models, signals, {})
+    keys = [str(result["parameter"].values[k]) for k in applicable]
+    bounds = dict(zip(keys, zip(low.tolist(), high.tolist(), strict=True), strict=True))
+    function = held_out_residuals(scenario, bounds, recording, finger)
     # Estimated starts are not known here: the recorded ones stand in.
-    count, z = len(applicable), problem.start.copy()
-    z[:count] = problem.to_search(np.append(estimate, problem.values(z)[count:]))[:count]
-    ends = problem.to_search(np.append(upper, problem.values(z)[count:]))[:count]
-    covariance, left_out = np.zeros((len(z), len(z))), list[Array]()
+    at_values, count = function.parameters.at_values, len(keys)
+    z = at_values(estimate)
+    covariance, half = np.zeros((len(z), len(z))), (at_values(upper) - z)[:count]
     correlation = result["correlation"].values[np.ix_(applicable, applicable)]
-    covariance[:count, :count] = np.outer(ends - z[:count], ends - z[:count]) / NORMAL_95**2 * correlation
+    covariance[:count, :count] = np.outer(half, half) / NORMAL_95**2 * correlation
     # A result of fewer than two settings or of an earlier version has none.
-    for values in result["left_out_estimate"].values[:, applicable] if "left_out" in result.dims else ():
-        left_out.append(problem.to_search(np.append(values, problem.values(z)[count:])))
+    without = result["left_out_estimate"].values[:, applicable] if "left_out" in result.dims else ()
+    left_out = list(map(at_values, without))
     # An identification stopped early has no covariance: the band is that of the noise alone.
-    return problem, z, np.nan_to_num(covariance, nan=0.0), left_out
+    return function, z, np.nan_to_num(covariance, nan=0.0), left_out
 
 
 def _noise(result: xr.Dataset, recording: str, name: str) -> tuple[float, float]:
@@ -194,41 +197,34 @@ def _repeats(recording: Recording, name: str, recordings: Sequence[Recording]) -
     return float(np.sqrt(np.mean(np.var(runs[:, compared], axis=0, ddof=1))))
 
 
+def _statistics(rows: Array) -> dict[str, float]:
+    """Return how well a signal is predicted by the rows of its samples."""
+    _, _, measured, value, band = rows
+    residual = measured - value
+    rms = np.sqrt(np.mean(residual**2))
+    return {
+        "rms": float(rms),
+        "bias": float(np.mean(residual)),
+        # A run that fails is within no band; without noise there is no band.
+        "within": float(np.mean(np.abs(residual) <= band)) if np.isfinite(band).all() else math.nan,
+        "band_ratio": float(np.sqrt(np.mean(band**2)) / NORMAL_95 / max(rms, 1e-300)),
+        "samples": len(residual),
+    }
+
+
 def _dataset(signals: Sequence[Mapping[str, Any]]) -> xr.Dataset:
     """Return the Dataset of predictions."""
-    columns: dict[str, list[Any]] = {name: [] for name in _TEXTS}
-    for signal in signals:
-        _, _, measured, value, band = signal["rows"]
-        residual = measured - value
-        of_signal = {
-            "rms": float(np.sqrt(np.mean(residual**2))),
-            "bias": float(np.mean(residual)),
-            # A run that fails is within no band; without noise there is no band.
-            "within": float(np.mean(np.abs(residual) <= band)) if np.isfinite(band).all() else math.nan,
-            "band_ratio": float(np.sqrt(np.mean(band**2)) / NORMAL_95 / max(np.sqrt(np.mean(residual**2)), 1e-300)),
-            "scatter": signal["scatter"],
-            "beyond": signal["beyond"],
-            "samples": len(residual),
-            "units": signal["unit"],
-            "steady": signal["steady"],
-        }
-        for name, values in columns.items():
-            values.append(of_signal[name])
-    index = np.repeat(np.arange(len(signals)), columns["samples"])
-    rows = np.concatenate([each["rows"] for each in signals], axis=1)
-    sample_texts = {
-        "instant": "time, s; number of a steady reading",
-        "applied": "what pulls, N",
-        "measured": "measured, in the unit of the signal",
-        "value": "predicted, in the unit of the signal",
-        "band": "half the width of the 95 % band about it",
-    }
+    columns = {f"prediction_{key}": [each[key] for each in signals] for key in _TEXTS}
+    index = np.repeat(np.arange(len(signals)), columns["prediction_samples"])
+    rows = [index, *np.concatenate([each["rows"] for each in signals], axis=1)]
     return xr.Dataset(
-        {f"prediction_{key}": ("prediction", column, {"long_name": _TEXTS[key]}) for key, column in columns.items()}
-        | {"predicted_index": ("predicted", index, {"long_name": "which prediction"})}
+        {
+            name: ("prediction", column, {"long_name": text})
+            for (name, column), text in zip(columns.items(), _TEXTS.values(), strict=True)
+        }
         | {
-            f"predicted_{name}": ("predicted", values, {"long_name": sample_texts[name]})
-            for name, values in zip(sample_texts, rows, strict=True)
+            f"predicted_{name}": ("predicted", values, {"long_name": text})
+            for (name, text), values in zip(_SAMPLE_TEXTS.items(), rows, strict=True)
         },
         {"prediction": [each["name"] for each in signals]},
     )

@@ -11,6 +11,7 @@ import xarray as xr
 
 from finger_pin.description.loading import ScenarioLike, load_scenario
 from finger_pin.exceptions import InputError
+from finger_pin.identification.residuals.motions import labelled
 from finger_pin.mechanism.coerce import FingerLike
 from finger_pin.simulation.prepared import prepare
 from finger_pin.simulation.recording import RunArrays
@@ -73,7 +74,8 @@ def propose(
 
 def _information(run: RunArrays, output: str, noise: float) -> Array:
     """Return the Fisher information of an output with noise, shape (p, p), while the derivatives hold."""
-    slopes = _slopes(run, output)[:, run.time < run.attrs["sensitivities_lost"]]
+    by_label = np.moveaxis(run.slopes[output.partition(".")[0]], 0, -1)
+    slopes = labelled(run, output, "outputs", by_label).T[:, run.time < run.attrs["sensitivities_lost"]]
     return np.asarray(slopes @ slopes.T / noise**2)
 
 
@@ -97,16 +99,3 @@ def _check(
     for key in prior:
         if key not in parameters:
             raise InputError(f"prior.{key}", f"is none of the parameters {', '.join(parameters)}")
-
-
-def _slopes(run: RunArrays, output: str) -> Array:
-    """Return the derivatives of an output by the parameters, shape (p, m)."""
-    variable, _, label = output.partition(".")
-    slopes, dims = run.slopes[variable], run.variables[variable][0]
-    parts = label.split(".", len(dims) - 2) if len(dims) > 2 else [label]
-    for axis, dim in reversed(list(enumerate(dims))[1:]):
-        labels, label = [str(each) for each in run[dim]], parts[min(axis, len(parts)) - 1]
-        if label not in labels:
-            raise InputError(f"outputs.{output}", f"there is no {label}; there are {', '.join(labels)}")
-        slopes = np.take(slopes, labels.index(label), axis=axis + 1)
-    return slopes

@@ -10,7 +10,7 @@ import servo_models
 from servo_models import Motion, advance, core_errors, fit, friction_level, quantities, simulate
 
 from finger_pin.description.loading import load_bench
-from finger_pin.identification.recordings import read_recording
+from finger_pin.identification.residuals.recordings import read_recording
 
 PAGE = Path(servo_models.__file__).parents[1] / "finger_pin" / "identification" / "README.md"
 # At a speed of v_s the exponential is 1/e for any alpha.

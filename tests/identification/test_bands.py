@@ -43,12 +43,12 @@ def linear_fit(slopes, samples):
     residual = samples - slopes @ np.linalg.lstsq(slopes, samples, rcond=None)[0]
     rho = np.clip(residual[1:] @ residual[:-1] / (residual @ residual), 0.0, 1.0 - 2.0 / len(samples))
     noise, weight = np.sqrt(np.mean(residual**2)), (1.0 - rho) / (1.0 + rho)
-    signal = SimpleNamespace(name="out", recording="one")
-    problem = SimpleNamespace(signals=[signal], noise_groups=np.zeros(1, dtype=int), slopes=lambda z: [slopes])
+    likelihood = SimpleNamespace(noises=np.zeros(1, dtype=int), kinds=np.zeros(1, dtype=int))
+    objective = SimpleNamespace(likelihood=likelihood, slopes=lambda z: [slopes])
     minimum = SimpleNamespace(
         z=np.zeros(slopes.shape[1]), noise=np.array([noise]), correlation=np.array([rho]), weights=np.array([weight])
     )
-    return problem, minimum, np.linalg.inv(slopes.T @ slopes * weight / noise**2)
+    return objective, minimum, np.linalg.inv(slopes.T @ slopes * weight / noise**2)
 
 
 def test_bands_hold_95_percent_of_further_samples_that_follow_each_other():
@@ -57,8 +57,8 @@ def test_bands_hold_95_percent_of_further_samples_that_follow_each_other():
     slopes = np.stack([np.ones_like(time), time], axis=1)
     half = []
     for samples in autoregressive(rng, 0.9, (400, time.size)):
-        problem, minimum, covariance = linear_fit(slopes, samples)
-        half.append(1.96 * minimum.noise[0] * SmallSample.from_fit(problem, minimum, covariance).noise[0])
+        objective, minimum, covariance = linear_fit(slopes, samples)
+        half.append(1.96 * minimum.noise[0] * SmallSample.from_fit(objective, minimum, covariance).noise[0])
     assert np.mean(2.0 * norm.cdf(half) - 1.0) == pytest.approx(0.95, abs=0.01)
     assert np.mean(half) / 1.96 == pytest.approx(1.0, abs=0.1)
 
@@ -67,9 +67,9 @@ def test_a_band_of_few_independent_samples_is_at_most_twice_as_wide():
     """Four degrees of freedom and half of the samples are left: t sqrt(2) / 1.96 = 2.776 * 1.414 / 1.96 = 2.003."""
     time = np.linspace(-1.0, 1.0, 500)
     slopes = np.stack([time**k for k in range(7)], axis=1)
-    problem, minimum, covariance = linear_fit(slopes, np.cumsum(np.random.default_rng(2).normal(size=500)))
+    objective, minimum, covariance = linear_fit(slopes, np.cumsum(np.random.default_rng(2).normal(size=500)))
     minimum.correlation[:], minimum.weights[:] = 0.996, 0.004 / 1.996
-    factor = SmallSample.from_fit(problem, minimum, covariance * 0.1).noise[0]
+    factor = SmallSample.from_fit(objective, minimum, covariance * 0.1).noise[0]
     assert 1.0 < factor <= 2.003
 
 

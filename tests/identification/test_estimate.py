@@ -7,10 +7,11 @@ from scipy.stats import norm
 
 import finger_pin as fp
 from finger_pin.description.loading import load_bench
-from finger_pin.identification.estimate import LOSSES, fit
-from finger_pin.identification.models import build_problem
-from finger_pin.identification.pipeline import starting_points
-from finger_pin.identification.recordings import read_recording
+from finger_pin.identification.residuals.models import fitted_residuals
+from finger_pin.identification.residuals.recordings import read_recording
+from finger_pin.identification.search.gauss_newton import LOSSES, fit
+from finger_pin.identification.search.objective import Objective
+from finger_pin.identification.search.search import starting_points
 
 COULOMB, DRAG, TURN = "finger.tendon_friction.coulomb", "finger.tendon_friction.drag", 2.5
 LOAD = np.repeat([3.0, 6.0, 9.0, 12.0, 15.0], 6)
@@ -27,7 +28,7 @@ def problem_of(measured, bounds):
     entries = {"parameters": bounds, "recordings": {"pull": {"kind": "steady", "speed": 0.05, **columns}}}
     scenario, settings = load_bench("canal", {"finger.tendons.T1.curvature_offset": TURN}, entries)
     data = {"in": LOAD, "out": measured}
-    return build_problem(scenario, settings, [read_recording("pull", settings.recordings["pull"], data)])
+    return fitted_residuals(scenario, settings, [read_recording("pull", settings.recordings["pull"], data)])
 
 
 @pytest.mark.slow
@@ -36,9 +37,10 @@ def test_a_minimum_is_that_of_least_squares_with_the_same_loss_and_bounds_inside
     measured = delivered((0.12, 0.4)) + np.random.default_rng(5).normal(0.0, 0.05, LOAD.size)
     measured[[4, 20]] += 0.4
     bounds = {COULOMB: (0.005, 1.0), DRAG: (0.0, greatest)}
-    problem = problem_of(measured, bounds)
-    for start in starting_points(problem, 2, 0):
-        found = fit(problem, start, loss=loss)
+    objective = Objective(problem_of(measured, bounds))
+    parameters = objective.function.parameters
+    for start in starting_points(objective, parameters.start, 2, 0):
+        found = fit(objective, start, loss=loss)
         # The deviation beyond which readings are outliers: 1.4826 median sizes of a normal distribution.
         size = np.median(np.abs(found.residuals[0])) / norm.ppf(0.75)
         expected = least_squares(
@@ -51,7 +53,7 @@ def test_a_minimum_is_that_of_least_squares_with_the_same_loss_and_bounds_inside
             ftol=1e-14,
         )
         assert found.converged
-        np.testing.assert_allclose(problem.values(found.z), expected.x, rtol=2e-4)
+        np.testing.assert_allclose(parameters.values(found.z), expected.x, rtol=2e-4)
 
 
 COLUMNS = {"inputs": {"tendon_command.T1": "in"}, "outputs": {"tendon_tension.T1": "out"}}
@@ -103,14 +105,14 @@ def test_a_search_that_starts_below_the_floor_of_the_law_ends_at_the_least_squar
 
 def test_starts_fill_the_bounds_evenly_and_again_alike_from_the_same_seed():
     """Of eight Sobol points every eighth of every range has one (a (0, 3)-net in base 2)."""
-    problem = problem_of(delivered((0.12, 0.4)), {COULOMB: (0.005, 1.0), DRAG: (0.0, 3.0)})
-    low, high = problem.box
-    first, again, other = (np.array(starting_points(problem, 3, seed)[1:]) for seed in (0, 0, 1))
+    objective = Objective(problem_of(delivered((0.12, 0.4)), {COULOMB: (0.005, 1.0), DRAG: (0.0, 3.0)}))
+    (low, high), start = objective.box, objective.function.parameters.start
+    first, again, other = (np.array(starting_points(objective, start, 3, seed)[1:]) for seed in (0, 0, 1))
     np.testing.assert_array_equal(first, again)
     assert not np.array_equal(first, other)
     eighths = np.sort(np.floor(8.0 * (first - low) / (high - low)), axis=0)
     np.testing.assert_array_equal(eighths, np.transpose([np.arange(8.0)] * 2))
-    assert len(starting_points(problem, 1, 0)) == 1
+    assert len(starting_points(objective, start, 1, 0)) == 1
 
 
 @pytest.mark.parametrize("gain", [1.0, 1.1])

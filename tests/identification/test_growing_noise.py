@@ -6,7 +6,8 @@ from scipy.optimize import minimize
 from scipy.stats import norm
 
 import finger_pin as fp
-from finger_pin.identification.likelihood import NoiseGrowth, minus_twice_likelihood
+from finger_pin.identification.likelihood import minus_twice_likelihood
+from finger_pin.identification.residuals.residuals import NoiseGrowth
 
 COULOMB, TURN, TRUE = "finger.tendon_friction.coulomb", 2.5, 0.12
 FLOOR, SHARE = 0.02, 0.06

@@ -7,7 +7,7 @@ from scipy.stats import t as student
 import finger_pin as fp
 from finger_pin.commands.application import run
 from finger_pin.description.recordings.columns import in_si
-from finger_pin.identification.checkpoint import FILE_NAME
+from finger_pin.identification.search.checkpoint import FILE_NAME
 from finger_pin.views.report import summarize_identification, write_report
 
 COULOMB, DRAG = "finger.tendon_friction.coulomb", "finger.tendon_friction.drag"

@@ -5,11 +5,9 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.description.loading import ParametrisedScenario, load_bench
-from finger_pin.identification.likelihood import minus_twice_likelihood
-from finger_pin.identification.limits import Limits
-from finger_pin.identification.models import build_problem
-from finger_pin.identification.recordings import read_recording
-from finger_pin.identification.scenario_parameters import ScenarioPart
+from finger_pin.identification.parameters.scenarios import Limits, ScenarioPart
+from finger_pin.identification.residuals.models import fitted_residuals
+from finger_pin.identification.residuals.recordings import read_recording
 
 COULOMB = "finger.tendon_friction.coulomb"
 JOINT_COULOMB, JOINT_STICTION = "finger.joint_friction.coulomb", "finger.joint_friction.stiction"
@@ -36,13 +34,13 @@ def test_slopes_that_searches_ask_for_know_what_bends_and_bends_back():
     entries, data = under_control(0.7)
     posed, tight = {"simulation.initial.position.medial": 0.2}, dict.fromkeys(TOLERANCES, 1e-11)
     found, exact = (
-        build_problem(scenario, settings, [read_recording("motion", settings.recordings["motion"], data["motion"])])
+        fitted_residuals(scenario, settings, [read_recording("motion", settings.recordings["motion"], data["motion"])])
         for scenario, settings in (load_bench("reversals", posed | more, entries) for more in ({}, tight))
     )
-    slopes = found.slopes(found.start)
+    slopes = found.slopes(found.parameters.start)
     for k in range(2):
         change = 1e-5 * (np.arange(2) == k)
-        ends = [exact.residuals(exact.start + way * change) for way in (1.0, -1.0)]
+        ends = [exact.residuals(exact.parameters.start + way * change) for way in (1.0, -1.0)]
         for own, later, sooner in zip(slopes, *ends, strict=True):
             expected = (later - sooner) / 2e-5
             assert np.sqrt(np.mean((own[:, k] - expected) ** 2)) < 0.02 * np.sqrt(np.mean(expected**2))
@@ -66,11 +64,10 @@ def test_profiles_follow_a_likelihood_that_errors_of_runs_do_not_make_jump():
     entries, data = under_control(4.0)
     scenario, settings = load_bench("reversals", None, entries)
     taken = [read_recording(name, each, data[name]) for name, each in settings.recordings.items()]
-    problem, jumps = build_problem(scenario, settings, taken), []
-    for each in (problem, problem.fine()):
-        along = [problem.start + 1e-6 * k for k in range(9)]
-        noise = np.ones(len(SEEN)), problem.noise_groups, problem.least_noise
-        met = [minus_twice_likelihood(each.residuals(z), *noise) for z in along]
+    problem, jumps = fitted_residuals(scenario, settings, taken), []
+    for each in (problem, problem.with_accuracy("fine")):
+        along = [problem.parameters.start + 1e-6 * k for k in range(9)]
+        met = [problem.likelihood.minus_twice_log(each.residuals(z)) for z in along]
         jumps.append(np.max(np.abs(np.diff(met, 2))))
     # What is a four-hundredth of the 3.84 that ends an interval is rounding, and may be as large either way.
     assert jumps[1] < max(0.5 * jumps[0], 0.01)
@@ -104,7 +101,7 @@ def test_coulomb_and_stiction_of_joints_are_found_together_though_their_bounds_o
 def test_values_that_do_not_go_together_are_brought_to_where_they_do_and_those_that_are_held_stay():
     family = ParametrisedScenario(fp.load_scenario("reversals"), (JOINT_COULOMB, JOINT_STICTION))
     part = ScenarioPart(family, np.arange(2), np.ones(2))
-    limits = Limits.from_parts([part], family.keys, np.array([1e-4, 1e-4]), np.array([1e-3, 2e-3]))
+    limits = Limits([part], family.keys, np.array([1e-4, 1e-4]), np.array([1e-3, 2e-3]))
     for given, free, nearest in [
         ((3e-4, 5e-4), (True, True), (3e-4, 5e-4)),
         ((9e-4, 5e-4), (True, False), (5e-4, 5e-4)),

@@ -7,8 +7,8 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.description.recordings.bench import RecordingSettings
-from finger_pin.identification.models import windows
-from finger_pin.identification.recordings import read_recording
+from finger_pin.identification.residuals.models import windows
+from finger_pin.identification.residuals.recordings import read_recording
 from finger_pin.laws.spring import JOINT_SPRING
 
 COULOMB, DRAG = "finger.tendon_friction.coulomb", "finger.tendon_friction.drag"

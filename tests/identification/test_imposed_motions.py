@@ -10,9 +10,9 @@ from scipy.integrate import solve_ivp
 import finger_pin as fp
 from finger_pin.description.recordings.bench import RecordingSettings
 from finger_pin.description.validation import validate
-from finger_pin.identification.models import recording_models
-from finger_pin.identification.recorded_inputs import without_commands
-from finger_pin.identification.recordings import read_recording
+from finger_pin.identification.residuals.models import recording_models
+from finger_pin.identification.residuals.recorded_inputs import without_commands
+from finger_pin.identification.residuals.recordings import read_recording
 
 LENGTH, WIDTH, MASS = (
     {"shoulder": 0.3, "elbow": 0.25},

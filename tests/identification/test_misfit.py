@@ -23,18 +23,14 @@ def stub(residual, slopes, *, ordered=True, replicate=None, weight=1.0):
         **{"recording": "one", "name": "out", "instant": np.arange(count), "replicate": replicate, "ordered": ordered},
         **{"measured": residual, "least_noise": 0.0},
     )
-    problem = SimpleNamespace(
-        signals=[signal],
-        models=[SimpleNamespace(recording=recording)],
-        groups=np.zeros(1, dtype=int),
-        noise_groups=np.zeros(1, dtype=int),
-        keys=("a",) * slopes.shape[1],
-        box=(np.full(slopes.shape[1], -1e6), np.full(slopes.shape[1], 1e6)),
-        slopes=lambda z: [slopes],
-    )
+    width = np.full(slopes.shape[1], 2e6)
+    models, parameters = [SimpleNamespace(recording=recording)], SimpleNamespace(keys=("a",) * len(width))
+    function = SimpleNamespace(signals=[signal], models=models, parameters=parameters)
+    likelihood = SimpleNamespace(outputs=np.zeros(1, dtype=int))
+    objective = SimpleNamespace(function=function, likelihood=likelihood, slopes=lambda z: [slopes], width=width)
     noise = np.full(1, np.sqrt(np.mean(residual**2)))
     found = SimpleNamespace(z=np.zeros(slopes.shape[1]), residuals=[residual], noise=noise, weights=np.full(1, weight))
-    return problem, found, np.linalg.inv(slopes.T @ slopes * weight / noise[0] ** 2)
+    return objective, found, np.linalg.inv(slopes.T @ slopes * weight / noise[0] ** 2)
 
 
 @pytest.mark.parametrize("rho", [0.6, 0.95])
@@ -46,9 +42,9 @@ def test_a_slope_that_swings_has_the_variance_of_the_noise_at_its_frequency(rho,
     residual = lfilter([np.sqrt(1.0 - rho**2)], [1.0, -rho], fresh)
     slopes = np.cos(frequency * np.arange(count))[:, None]
     weight = (1.0 - rho) / (1.0 + rho)
-    problem, found, naive = stub(residual, slopes, weight=weight)
+    objective, found, naive = stub(residual, slopes, weight=weight)
     density = (1.0 - rho**2) / (1.0 - 2.0 * rho * np.cos(frequency) + rho**2)
-    assert sandwich_covariance(problem, found, naive)[0, 0] == pytest.approx(weight * density * naive[0, 0], rel=0.05)
+    assert sandwich_covariance(objective, found, naive)[0, 0] == pytest.approx(weight * density * naive[0, 0], rel=0.05)
 
 
 def test_readings_whose_law_misses_something_count_as_one_for_each_setting():
@@ -56,19 +52,19 @@ def test_readings_whose_law_misses_something_count_as_one_for_each_setting():
     rng, replicate = np.random.default_rng(2), np.repeat(np.arange(50), 8)
     residual = 0.3 * rng.normal(size=50)[replicate] + 0.1 * rng.normal(size=400)
     residual -= residual.mean()
-    problem, found, naive = stub(residual, np.ones((400, 1)), ordered=False, replicate=replicate)
-    variance = sandwich_covariance(problem, found, naive)[0, 0]
+    objective, found, naive = stub(residual, np.ones((400, 1)), ordered=False, replicate=replicate)
+    variance = sandwich_covariance(objective, found, naive)[0, 0]
     means = residual.reshape(50, 8).mean(axis=1)
     assert variance == pytest.approx(means.var(ddof=1) / 50, rel=0.02)
-    assert repeats(problem, found.residuals)[0].p_value < 1e-6
+    assert repeats(objective.function, found.residuals)[0].p_value < 1e-6
 
 
 def test_readings_whose_law_holds_are_said_to_miss_something_as_rarely_as_chance_has_it():
     rng, replicate = np.random.default_rng(3), np.repeat(np.arange(8), 5)
     chances = []
     for _ in range(400):
-        problem, found, _ = stub(rng.normal(size=40), np.zeros((40, 0)), ordered=False, replicate=replicate)
-        chances.append(repeats(problem, found.residuals)[0].p_value)
+        objective, found, _ = stub(rng.normal(size=40), np.zeros((40, 0)), ordered=False, replicate=replicate)
+        chances.append(repeats(objective.function, found.residuals)[0].p_value)
     # Uniform: the share below 0.2 is 0.2, with a standard deviation of 0.02.
     assert np.mean(np.array(chances) < 0.2) == pytest.approx(0.2, abs=0.06)
 

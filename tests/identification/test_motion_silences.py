@@ -12,9 +12,9 @@ from finger_pin.description.loading import load_bench
 from finger_pin.description.recordings.bench import RecordingSettings
 from finger_pin.description.validation import validate
 from finger_pin.exceptions import ScenarioWarning
-from finger_pin.identification import motions
-from finger_pin.identification.models import build_problem, recording_models
-from finger_pin.identification.recordings import read_recording
+from finger_pin.identification.residuals import motions
+from finger_pin.identification.residuals.models import fitted_residuals, recording_models
+from finger_pin.identification.residuals.recordings import read_recording
 
 BENT = {"finger.tendons.T1.curvature_offset": TURN, DRAG: 0.4}
 
@@ -22,7 +22,7 @@ BENT = {"finger.tendons.T1.curvature_offset": TURN, DRAG: 0.4}
 def problem(data, **more):
     entries = {"parameters": {COULOMB: (0.05, 0.5)}, "recordings": {"pull": {**MOTION, "settle": 0.2, **more}}}
     scenario, settings = load_bench("canal", BENT, entries)
-    return build_problem(scenario, settings, [read_recording("pull", settings.recordings["pull"], data)])
+    return fitted_residuals(scenario, settings, [read_recording("pull", settings.recordings["pull"], data)])
 
 
 @pytest.mark.slow
@@ -30,7 +30,7 @@ def problem(data, **more):
 def test_slopes_where_the_steps_of_a_run_do_not_bear_other_numbers_are_those_of_runs(monkeypatch, failing):
     data = motion(np.random.default_rng(2), 0.15, 0.4, 0.0)
     asked = problem(data)
-    expected = np.concatenate(asked.slopes(asked.start))
+    expected = np.concatenate(asked.slopes(asked.parameters.start))
     repeat_steps = motions.repeat_steps
 
     def failed(trajectory, others):
@@ -40,7 +40,7 @@ def test_slopes_where_the_steps_of_a_run_do_not_bear_other_numbers_are_those_of_
         return ended if failing == "all" else [runs[0], *ended[1:]]
 
     monkeypatch.setattr(motions, "repeat_steps", failed)
-    slopes = np.concatenate(problem(data).slopes(asked.start))
+    slopes = np.concatenate(problem(data).slopes(asked.parameters.start))
     assert np.sqrt(np.mean((slopes - expected) ** 2)) < 0.03 * np.sqrt(np.mean(expected**2))
 
 

@@ -9,8 +9,8 @@ import finger_pin as fp
 from finger_pin.description.loading import load_bench
 from finger_pin.description.recordings.bench import RecordingSettings
 from finger_pin.description.validation import validate
-from finger_pin.identification.models import build_problem
-from finger_pin.identification.recordings import read_recording
+from finger_pin.identification.residuals.models import fitted_residuals
+from finger_pin.identification.residuals.recordings import read_recording
 
 BENT = {"finger.tendons.T1.curvature_offset": TURN}
 
@@ -79,7 +79,7 @@ def test_what_rings_undamped_is_said_only_where_steps_follow_it(viscous, rows, r
     entries = {"parameters": {COULOMB: (0.1, 0.2)}, "recordings": {"pull": MOTION}}
     scenario, settings = load_bench("canal", {**BENT, DRAG: 0.4, "finger.joint_friction.viscous": viscous}, entries)
     table = {name: values[:rows] for name, values in data.items()}
-    problem = build_problem(scenario, settings, [read_recording("pull", settings.recordings["pull"], table)])
+    problem = fitted_residuals(scenario, settings, [read_recording("pull", settings.recordings["pull"], table)])
     said = problem.models[0].ringing(problem.models[0].scenario, {})
     assert ("tendon_stiction[T1] rings almost undamped at" in said) == rings and bool(said) == rings
 

@@ -10,7 +10,7 @@ from finger_pin.description.recordings.csv_files import TableFormat, read_column
 from finger_pin.description.recordings.units import in_si
 from finger_pin.description.validation import validate
 from finger_pin.exceptions import InputError
-from finger_pin.identification.recordings import read_recording, wraparound_warning
+from finger_pin.identification.residuals.recordings import read_recording, wraparound_warning
 
 BENCH = """
 extends = "canal"

@@ -5,9 +5,9 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.description.loading import load_bench
-from finger_pin.identification.checkpoint import digest
-from finger_pin.identification.models import build_problem
-from finger_pin.identification.recordings import read_recording
+from finger_pin.identification.identify import digest
+from finger_pin.identification.residuals.models import fitted_residuals
+from finger_pin.identification.residuals.recordings import read_recording
 from finger_pin.views.report import summarize_identification
 
 FINGER = """
@@ -110,14 +110,14 @@ def test_entries_of_one_recording_act_on_it_alone_and_count_for_what_is_resumed(
         entries = {"parameters": BOUNDS, "recordings": {"a": recording(**change), "b": recording()}}
         scenario, settings = load_bench(bench, None, entries)
         taken = [read_recording(name, each, data) for name, each in settings.recordings.items()]
-        digests.append(digest(scenario, settings, taken, ()))
-        problem = build_problem(scenario, settings, taken)
-        residuals.append(problem.residuals(problem.start))
+        digests.append(digest(scenario, settings, taken))
+        problem = fitted_residuals(scenario, settings, taken)
+        residuals.append(problem.residuals(problem.parameters.start))
     assert len({*digests}) == 3
     for k, same in ((1, False), (2, True)):
         assert np.array_equal(residuals[k][0], residuals[0][0]) == same
         np.testing.assert_array_equal(residuals[k][1], residuals[0][1])
-    slopes = problem.slopes(problem.start)
+    slopes = problem.slopes(problem.parameters.start)
     # The last parameter is the gain of a.
     assert np.abs(slopes[0][:, 2]).max() > 1e-3 and not slopes[1][:, 2].any()
 
@@ -163,5 +163,5 @@ def test_keys_that_do_not_share_a_number_are_refused_in_one_line(bench, keys, sa
     scenario, settings = load_bench(bench, {}, entries)
     data = {"t": TIME, "goal": GOAL, "q": GOAL}
     with pytest.raises(fp.InputError) as refused:
-        build_problem(scenario, settings, [read_recording("a", settings.recordings["a"], data)])
+        fitted_residuals(scenario, settings, [read_recording("a", settings.recordings["a"], data)])
     assert said in str(refused.value) and "\n" not in str(refused.value)

@@ -7,8 +7,8 @@ import finger_pin as fp
 from finger_pin.analysis import settled_posture
 from finger_pin.description.recordings.bench import RecordingSettings
 from finger_pin.description.validation import validate
-from finger_pin.identification.recordings import read_recording
-from finger_pin.identification.steady_data import SteadyReadings
+from finger_pin.identification.residuals.recordings import read_recording
+from finger_pin.identification.residuals.steady_data import SteadyReadings
 
 THREE = """
 [finger]

@@ -9,8 +9,8 @@ import pytest
 import finger_pin as fp
 from finger_pin.description.loading import load_bench
 from finger_pin.description.recordings.columns import read_columns
-from finger_pin.identification.models import recording_models
-from finger_pin.identification.recordings import read_recording
+from finger_pin.identification.residuals.models import recording_models
+from finger_pin.identification.residuals.recordings import read_recording
 
 pytestmark = pytest.mark.slow
 

@@ -9,11 +9,13 @@ import numpy as np
 from finger_pin.analysis import rubbing_cords, settled_posture, steady_state
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.loading import read_scenario
+from finger_pin.description.parameters import Winch
 from finger_pin.description.scenario import Scenario
+from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
-from finger_pin.identification.recordings import Recording, ScenarioMap, check_tension_sign
-from finger_pin.identification.resting_finger import resting_finger, wound_length
-from finger_pin.identification.scenario_parameters import NuisanceParameter, corrections
+from finger_pin.identification.parameters.keys import corrections
+from finger_pin.identification.parameters.parameters import ScenarioMap
+from finger_pin.identification.residuals.recordings import Recording, RecordingModel, check_tension_sign
 from finger_pin.mechanism.coerce import FingerLike, with_parameters_of
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
@@ -24,7 +26,7 @@ _POSTURE, _TENSIONS, _GOALS = "joint_position", ("tendon_command", "spool_tensio
 _OUTPUTS = ("tendon_tension", "tendon_friction", "motor_current", _POSTURE)
 
 
-class SteadyReadings:
+class SteadyReadings(RecordingModel):
     """Recording of steady states compared with a scenario.
 
     Attributes:
@@ -32,7 +34,6 @@ class SteadyReadings:
         load: The pull at the entrance of the canals, N, or of wound tendons the angle or length, shape (m, a).
         wound_tendons: Tendons that a winch or a motor winds, by input.
         scenario: Whose states they are.
-        nuisance_parameters: Nothing is to be found for them alone.
     """
 
     def __init__(self, recording: Recording, scenario: Scenario, replacement: Finger | None = None) -> None:
@@ -45,7 +46,6 @@ class SteadyReadings:
         without_motor = [each for each in self.wound_tendons.values() if each not in self._motor_of_tendon]
         self.scenario = _with_windings(scenario, without_motor)
         finger, self._replacement = self.scenario.finger, replacement
-        self.nuisance_parameters: tuple[NuisanceParameter, ...] = ()
         rows = len(recording.speed)
         joints, tendons = list(finger.joints), list(finger.actuated_names)
         self._inputs: list[tuple[str, Array, int]] = []
@@ -71,30 +71,25 @@ class SteadyReadings:
             raise InputError(f"{self._entry}.inputs.{goals[0]}", allowed)
         self._compares_posture = any(variable == _POSTURE for variable, _ in self._outputs)
         if self._compares_posture:
-            self._check_direction()
-            self._check_drives()
+            self._check_rest()
             self.check({})
 
     def _read_inputs(self, joints: Sequence[str], tendons: Sequence[str]) -> None:
         """Put every input in its column of loads or angles."""
         for name, values in self.recording.inputs.items():
             variable, _, label = name.partition(".")
-            if variable in (*_TENSIONS, *_GOALS):
-                if variable in _TENSIONS:
-                    check_tension_sign(f"{self._entry}.inputs.{name}", values)
-                index = self._index(f"inputs.{name}", self.wound_tendons.get(name, label), tendons)
-                other = next((each for each, group, k in self._inputs if group is self.load and k == index), None)
-                if other is not None:
-                    raise InputError(f"{self._entry}.inputs.{name}", f"is of the same cord as {other}: leave one out")
-                self.load[:, index] = values
-                self._inputs.append((name, self.load, index))
-            elif variable == "joint_position":
-                index = self._index(f"inputs.{name}", label, joints)
-                self._position[:, index] = values
-                self._inputs.append((name, self._position, index))
-            else:
+            if variable not in (*_TENSIONS, *_GOALS, _POSTURE):
                 allowed = f"a steady state is given {', '.join([*_TENSIONS, *_GOALS])} and {_POSTURE}"
                 raise InputError(f"{self._entry}.inputs.{name}", allowed)
+            if variable in _TENSIONS:
+                check_tension_sign(f"{self._entry}.inputs.{name}", values)
+            group, labels = (self._position, joints) if variable == _POSTURE else (self.load, tendons)
+            index = self._index(f"inputs.{name}", self.wound_tendons.get(name, label), labels)
+            other = next((each for each, known, k in self._inputs if known is group and k == index), None)
+            if other is not None:
+                raise InputError(f"{self._entry}.inputs.{name}", f"is of the same cord as {other}: leave one out")
+            group[:, index] = values
+            self._inputs.append((name, group, index))
 
     def compute(self, scenario: Scenario, nuisance: Mapping[str, float]) -> list[Array]:
         """Return the computed values of every output, shape (m,) each."""
@@ -139,14 +134,6 @@ class SteadyReadings:
             columns.append([(u - d) / (right - left) for u, d in zip(up, down, strict=True)])
         return [np.stack(each, axis=1) for each in zip(*columns, strict=True)]
 
-    def warnings(self, searched_keys: Collection[str]) -> list[str]:
-        """Return no warnings: readings have no start."""
-        return []
-
-    def ringing(self, scenario: Scenario, nuisance: Mapping[str, float]) -> str:
-        """Return an empty text: nothing rings at rest."""
-        return ""
-
     def check(self, nuisance: Mapping[str, float]) -> None:
         """Raise an error for goals beyond the range of a motor's encoder."""
         load, _ = self._corrected(nuisance)
@@ -160,9 +147,6 @@ class SteadyReadings:
             if encoder is not None and not encoder.range[0] <= angle.min() <= angle.max() <= encoder.range[1]:
                 allowed = f"{self._entry}.inputs.{name} takes the spool from {angle.min():.4g} to {angle.max():.4g} rad"
                 raise InputError(f"finger.actuators.{motor}.motor.encoder.range", allowed, list(encoder.range))
-
-    def scale_tolerances(self, factor: float) -> None:
-        """Do nothing: a closed form has no errors."""
 
     def _corrected(self, nuisance: Mapping[str, float]) -> tuple[Array, Array]:
         """Return tensions, shape (m, a), N, and angles, (m, n), rad, with scales and offsets that are being found."""
@@ -185,7 +169,7 @@ class SteadyReadings:
     def _finger(self, scenario: Scenario) -> Finger:
         """Return the finger at rest, with sources and winches in place of motors."""
         finger, objects, driven = scenario.finger, scenario.environment.objects, self._driven(scenario)
-        resting = resting_finger(finger, self.wound_tendons.values()) if finger.actuators else finger
+        resting = _resting_finger(finger, self.wound_tendons.values()) if finger.actuators else finger
         if isinstance(driven, Finger):
             return driven.changed(resting, objects) if finger.actuators else driven
         return Finger(resting, objects=objects)
@@ -197,13 +181,13 @@ class SteadyReadings:
         for name, tendon in self.wound_tendons.items():
             if tendon in self._motor_of_tendon:
                 index, angle = scenario.finger.actuated_names.index(tendon), name.startswith("spool_angle.")
-                load[:, index] = wound_length(scenario.finger, self._motor_of_tendon[tendon], load[:, index], angle)
+                load[:, index] = _wound_length(scenario.finger, self._motor_of_tendon[tendon], load[:, index], angle)
         speeds = [None] * len(load) if self.recording.settings.speed is None else self.recording.speed.tolist()
         rows = zip(load, speeds, self._position, strict=True)
         return np.array([settled_posture(finger, each, speed, guess, force) for each, speed, guess in rows])
 
-    def _check_direction(self) -> None:
-        """Refuse joints that are both input and output, and a direction that leaves the friction open.
+    def _check_rest(self) -> None:
+        """Refuse joints that are input and output, and directions and position drives that leave the rest open.
 
         Of many postures at rest, a direction of sliding tells one where a single tendon rubs and the joints do not.
         """
@@ -222,9 +206,6 @@ class SteadyReadings:
                 f"friction (shaken, or the mean of drawn in and let out), or set that friction to 0"
             )
             raise InputError(f"{self._entry}.speed", allowed)
-
-    def _check_drives(self) -> None:
-        """Refuse motors in position drive that are given neither a goal nor the tension of their cord."""
         tensions = {each.partition(".")[2] for each in self.recording.inputs if each.startswith("spool_tension.")}
         for motor, actuator in self.scenario.finger.actuators.items():
             tendon = actuator.tendons[0]
@@ -273,3 +254,45 @@ def _with_windings(scenario: Scenario, tendons: Sequence[str]) -> Scenario:
         controller.get("tensions", {}).pop(name, None)
         controller.setdefault("tendon_winding", {})[name] = {"offset": 0.0}
     return read_scenario(table)
+
+
+def _resting_finger(finger: FingerDescription, wound_tendons: Collection[str]) -> FingerDescription:
+    """Return a finger with ideal sources and winches in place of its motors, as they are at rest without friction.
+
+    A position drive holds by its error e: its torque K_t V k_p e / R makes it a spring in series with its cord, T / K +
+    r^2 T / (K_t V k_p / R). With an integral it stands at its goal. No motor holds more than K_t min(V / R, I_max).
+
+    Args:
+        finger: Whose motors wind one cord each where they are given goals.
+        wound_tendons: Names of the tendons that these pull; of all others the tension is known.
+    """
+    tendons = dict(finger.tendons)
+    for key, actuator in finger.actuators.items():
+        tendon, motor, radius = actuator.tendons[0], actuator.motor, float(actuator.radii[0])
+        constant, resistance, _ = motor.constants
+        maximum_tension = constant * min(motor.voltage / resistance, motor.maximum_current) / radius
+        if tendon in wound_tendons:
+            stiffness, loop = _cord_properties(finger, key)[0], actuator.position_loop
+            torque_per_error = constant * motor.voltage / resistance * loop.proportional
+            if not loop.integral:
+                stiffness *= torque_per_error / (torque_per_error + stiffness * radius**2)
+            winch = Winch().updated(stiffness=stiffness)
+            tendons[tendon] = tendons[tendon].updated(winch=winch, maximum_tension=maximum_tension)
+        elif actuator.drive == "tension":
+            tendons[tendon] = tendons[tendon].updated(maximum_tension=maximum_tension)
+    return finger.updated(actuators={}, tendons=tendons)
+
+
+def _wound_length(finger: FingerDescription, motor: str, goal: Array, is_angle: bool) -> Array:
+    """Return the winding of the winch in place of a motor, m, for goals of its spool, rad, or of its cord, m."""
+    stiffness, pretension = _cord_properties(finger, motor)
+    return np.asarray((finger.actuators[motor].radii[0] if is_angle else 1.0) * goal + pretension / stiffness)
+
+
+def _cord_properties(finger: FingerDescription, motor: str) -> tuple[float, float]:
+    """Return the stiffness, N/m, and the pretension, N, of a motor's only cord."""
+    actuator = finger.actuators[motor]
+    rigidity, length, pretension = (
+        float(expand(each, 1)[0]) for each in (actuator.tendon_rigidity, actuator.tendon_length, actuator.pretension)
+    )
+    return rigidity / length, pretension

@@ -14,11 +14,9 @@ from finger_pin.description.recordings.bench import IMPOSED
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.tables import Series
 from finger_pin.exceptions import InputError
-from finger_pin.identification.recordings import RANGE_MARGIN, Recording, check_tension_sign
-from finger_pin.identification.scenario_parameters import Corrections, NuisanceParameter, corrections
+from finger_pin.identification.parameters.keys import Corrections, corrections
+from finger_pin.identification.residuals.recordings import Recording, check_tension_sign
 
-# Half range of an estimated start about the recorded one, rad.
-_START_MARGIN = 0.3
 # Number of samples at a window's start for the line that gives its position and velocity.
 _START_SAMPLES = 9
 # Distance of a start from the recorded one above which to warn, part of the joint's range.
@@ -79,26 +77,6 @@ def recorded_starts(recording: Recording, rows: NDArray[np.intp], joints: Collec
         delay = recording.settings.outputs[name].delay
         starts[joint] = RecordedStart(name, float(line[-1]), float(line[0]) if degree else 0.0, delay)
     return starts
-
-
-def check_reachable(entry: str, starts: Mapping[str, tuple[float, float]], scenario: Scenario) -> None:
-    """Refuse starts whose angles are far beyond joints' ranges."""
-    for joint, (angle, _) in starts.items():
-        low, high = scenario.finger.joints[joint].range
-        if not low - RANGE_MARGIN <= angle <= high + RANGE_MARGIN:
-            allowed = f"cannot be reached: {joint} begins at {angle:.3g} rad, and its range is {low:.3g} to {high:.3g}"
-            raise InputError(entry, allowed)
-
-
-def start_parameters(
-    recording: str, window: int, starts: Mapping[str, tuple[float, float]]
-) -> tuple[NuisanceParameter, ...]:
-    """Return the nuisance parameters of joints' starts, near the recorded ones."""
-    prefix = f"recordings.{recording}.start.{window}"
-    return tuple(
-        NuisanceParameter(f"{prefix}.{joint}", angle - _START_MARGIN, angle + _START_MARGIN, angle)
-        for joint, (angle, _) in starts.items()
-    )
 
 
 def far_start_warning(

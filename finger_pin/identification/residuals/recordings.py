@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,35 +18,20 @@ from finger_pin.description.recordings.csv_files import chosen_rows, read_column
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import IN_RADIANS, MOST_ANGLE
 from finger_pin.exceptions import InputError
-from finger_pin.identification.scenario_parameters import NuisanceParameter
+from finger_pin.identification.parameters.parameters import NuisanceParameter, ScenarioMap
 from finger_pin.typing import Array
 
-#: SI units of the common variables; a column of any other is in SI.
-SI_UNITS = {
-    "tendon_command": "N",
-    "tendon_tension": "N",
-    "tendon_friction": "N",
-    "spool_tension": "N",
-    "passive_tension_proximal": "N",
-    "contact_force": "N",
-    "contact_normal_force": "N",
-    "fingertip_force": "N",
-    "fingertip_position": "m",
-    "tendon_velocity": "m/s",
-    "joint_position": "rad",
-    "joint_reference": "rad",
-    "tracking_error": "rad",
-    "joint_velocity": "rad/s",
-    "joint_torque": "N m",
-    "joint_effort": "N m",
-    "motor_position": "rad",
-    "motor_velocity": "rad/s",
-    "motor_current": "A",
-    "motor_voltage": "V",
-    "supply_voltage": "V",
-    "motor_torque": "N m",
-    "spool_angle": "rad",
-    "tendon_winding": "m",
+# SI units of the common variables; a column of any other is in SI.
+_TENSIONS = ("tendon_command", "tendon_tension", "tendon_friction", "spool_tension", "passive_tension_proximal")
+_ANGLES = ("joint_position", "joint_reference", "tracking_error", "motor_position", "spool_angle")
+_SI_UNITS = {
+    **dict.fromkeys((*_TENSIONS, "contact_force", "contact_normal_force", "fingertip_force"), "N"),
+    **dict.fromkeys(("fingertip_position", "tendon_winding"), "m"),
+    **dict.fromkeys(_ANGLES, "rad"),
+    **dict.fromkeys(("joint_velocity", "motor_velocity"), "rad/s"),
+    **dict.fromkeys(("joint_torque", "joint_effort", "motor_torque"), "N m"),
+    **dict.fromkeys(("motor_voltage", "supply_voltage"), "V"),
+    **{"tendon_velocity": "m/s", "motor_current": "A"},
 }
 #: Greatest excess of a recorded angle over a joint's range, rad.
 RANGE_MARGIN = 0.2
@@ -123,47 +109,53 @@ class Recording:
         return all(np.array_equal(one, another) for one, another in pairs)
 
 
-#: Maps values to a scenario, and to the numbers that belong to a recording, by key.
-ScenarioMap = Callable[[Array], tuple[Scenario, dict[str, float]]]
+class RecordingModel(ABC):
+    """Recording, or a part of one, compared with a scenario.
 
+    Attributes:
+        recording: The recording.
+        scenario: The scenario with the recording's inputs.
+        nuisance_parameters: The parameters of this recording alone.
+    """
 
-class RecordingModel(Protocol):
-    """Recording, or a part of one, compared with a scenario."""
-
-    @property
-    def recording(self) -> Recording:
-        """The recording."""
-
-    @property
-    def scenario(self) -> Scenario:
-        """The scenario with the recording's inputs."""
-
-    @property
-    def nuisance_parameters(self) -> tuple[NuisanceParameter, ...]:
-        """The parameters of this recording alone."""
+    recording: Recording
+    scenario: Scenario
+    nuisance_parameters: Sequence[NuisanceParameter] = ()
 
     def warnings(self, searched_keys: Collection[str]) -> list[str]:
         """Return warnings about a recording for the parameters to be found."""
+        return []
 
+    @abstractmethod
     def check(self, nuisance: Mapping[str, float]) -> None:
         """Raise the error of offsets and scales of inputs with which the recording cannot be computed."""
 
+    @abstractmethod
     def compute(self, scenario: Scenario, nuisance: Mapping[str, float]) -> list[Array]:
-        """Return the computed values of every output, shape (m,) each."""
+        """Return the computed values of every output, shape (m,) each; not a number if a run fails."""
 
+    @abstractmethod
     def slopes(self, scenario_map: ScenarioMap, values: Array, sizes: Array) -> list[Array]:
-        """Return the derivatives of the outputs by the values, shape (m, p) each, by changes of given sizes."""
+        """Return the derivatives of the outputs by the values, shape (m, p) each.
+
+        Args:
+            scenario_map: Maps values to a scenario and the numbers of this recording.
+            values: Values of the parameters, shape (p,).
+            sizes: Sizes of changes of the values, shape (p,).
+        """
 
     def ringing(self, scenario: Scenario, nuisance: Mapping[str, float]) -> str:
         """Return a warning about what rings almost undamped and makes the run slow; empty without any."""
+        return ""
 
-    def scale_tolerances(self, factor: float) -> None:
-        """Multiply the tolerances of further computations by a factor."""
+    def with_tolerances(self, factor: float) -> Self:
+        """Return the model with the scenario's tolerances multiplied by a factor; a closed form has no errors."""
+        return self
 
 
 def unit_of(name: str) -> str:
     """Return the SI unit of ``variable.label``; empty for an unknown one."""
-    return SI_UNITS.get(name.partition(".")[0], "")
+    return _SI_UNITS.get(name.partition(".")[0], "")
 
 
 def check_tension_sign(entry: str, tension: Array) -> None:
@@ -183,11 +175,11 @@ def read_recording(
     if data is None and settings.file is None:
         raise InputError(f"{entry}.file", "is missing: the path of a CSV file")
     path = Path(str(settings.file))
-    columns = read_columns(f"{entry}.file {path.name}", path, settings) if data is None else data
-    columns = chosen_rows(entry, columns, settings.rows)
-    table, held_out = Table(entry, columns), np.zeros(0, dtype=bool)
+    cells = read_columns(f"{entry}.file {path.name}", path, settings) if data is None else data
+    cells = chosen_rows(entry, cells, settings.rows)
+    table, held_out = Table(entry, cells), np.zeros(0, dtype=bool)
     if isinstance(settings.held_out, dict):
-        held_out = row_mask(f"{entry}.held_out", columns, settings.held_out)
+        held_out = row_mask(f"{entry}.held_out", cells, settings.held_out)
         if held_out.all():
             raise InputError(f"{entry}.held_out", "leaves no row to be fitted; write true", settings.held_out)
     time = np.arange(table.rows) / (settings.sample_rate or math.inf)
@@ -202,22 +194,19 @@ def read_recording(
             raise InputError(f"{entry}.speed", "must not be zero: friction has the sign of sliding")
     elif settings.speed is not None:
         speed = np.full(table.rows, settings.speed)
-    columns_of = {group: getattr(settings, group) for group in ("inputs", "outputs")}
-    signals = {
-        group: {key: _signal(table, f"{group}.{key}", column) for key, column in each.items()}
-        for group, each in columns_of.items()
-    }
-    all_columns = [(group, key, column) for group, each in columns_of.items() for key, column in each.items()]
+    groups = {"inputs": settings.inputs, "outputs": settings.outputs}
+    columns = {(group, key): column for group, each in groups.items() for key, column in each.items()}
+    signals = {place: _signal(table, *place, column) for place, column in columns.items()}
     return Recording(
         name,
         settings,
-        signals["inputs"],
-        signals["outputs"],
+        {key: values for (group, key), values in signals.items() if group == "inputs"},
+        {key: values for (group, key), values in signals.items() if group == "outputs"},
         time,
         speed,
-        frozenset(key for _, key, column in all_columns if not table.names_unit(column)),
+        frozenset(key for (_, key), column in columns.items() if not table.names_unit(column)),
         held_out,
-        {key: table.turn(f"{group}.{key}", column) for group, key, column in all_columns if unit_of(key) == "rad"},
+        {key: table.turn(f"{group}.{key}", each) for (group, key), each in columns.items() if unit_of(key) == "rad"},
     )
 
 
@@ -249,11 +238,10 @@ def check_angles(recording: Recording, scenario: Scenario) -> None:
                 raise InputError(f"identify.recordings.{recording.name}.{group}.{name}", f"{allowed} {hint}", farthest)
 
 
-def _signal(table: Table, key: str, column: Column) -> Array:
+def _signal(table: Table, group: str, name: str, column: Column) -> Array:
     """Return a column in SI; cells of outputs may be empty, and angles of joints are asked about."""
-    group, _, name = key.partition(".")
-    values = table.column(key, column, unit_of(name), missing=group == "outputs")
+    values = table.column(f"{group}.{name}", column, unit_of(name), missing=group == "outputs")
     if name.startswith("joint_position.") and np.nanmax(np.abs(values), initial=0.0) > MOST_ANGLE:
         allowed = f"angles must be at most {MOST_ANGLE:g}{IN_RADIANS}"
-        raise InputError(f"{table.entry}.{key}", allowed, float(np.nanmax(np.abs(values))))
+        raise InputError(f"{table.entry}.{group}.{name}", allowed, float(np.nanmax(np.abs(values))))
     return values

@@ -20,10 +20,10 @@ from finger_pin.description.commands import WINDINGS
 from finger_pin.description.recordings.bench import IMPOSED
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
-from finger_pin.identification.motions import RecordedMotion
-from finger_pin.identification.recorded_inputs import without_commands
-from finger_pin.identification.recordings import RANGE_MARGIN, Recording
-from finger_pin.identification.scenario_parameters import Corrections, corrections
+from finger_pin.identification.parameters.keys import Corrections, corrections
+from finger_pin.identification.residuals.motions import RecordedMotion
+from finger_pin.identification.residuals.recorded_inputs import without_commands
+from finger_pin.identification.residuals.recordings import RANGE_MARGIN, Recording
 from finger_pin.mechanism.finger import Finger
 from finger_pin.references.signal import Signal
 from finger_pin.typing import Array

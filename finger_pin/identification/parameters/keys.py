@@ -1,103 +1,18 @@
-"""Parameters that are keys of a scenario: those that all recordings share, and those of one recording alone."""
+"""Keys of parameters: of a scenario or of a recording's column, shared by all recordings or of some of them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from finger_pin.description.loading import ParametrisedScenario
 from finger_pin.description.recordings.bench import OF_RECORDINGS, RecordingSettings
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.tables import split
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
-
-
-@dataclass(frozen=True)
-class NuisanceParameter:
-    """Nuisance parameter of one recording, such as its initial angle."""
-
-    key: str
-    low: float
-    high: float
-    start: float
-
-
-@dataclass(frozen=True, eq=False)
-class ScenarioPart:
-    """Scenarios of one recording, by the parameters that act on it.
-
-    Attributes:
-        family: The scenarios, by every entry that one of the parameters sets.
-        indices: Which of the parameters that are keys of a scenario sets each entry, shape (k,).
-        factors: Each entry over its parameter, shape (k,).
-    """
-
-    family: ParametrisedScenario
-    indices: NDArray[np.intp]
-    factors: Array
-
-    def scenario_at(self, values: Array) -> Scenario:
-        """Return the scenario at values of all parameters that are keys of a scenario."""
-        return _with_values(self, tuple((self.factors * values[self.indices]).tolist()))
-
-    @classmethod
-    def from_keys(cls, scenario: Scenario, recording: str | None, keys: Sequence[str]) -> ScenarioPart:
-        """Return the scenarios of a recording, by the keys that are shared or of this recording."""
-        acting = [k for k, key in enumerate(keys) if recording is None or acts_on(key, recording)]
-        # The first entry of a key comes last: a search starts from its value.
-        entries = [(k, *entry) for k in acting for entry in reversed(tied_entries(keys[k]))]
-        for k, entry, _ in entries:
-            if not recording_pattern(keys[k]):
-                continue
-            try:
-                ParametrisedScenario(scenario, (entry,))
-            except InputError as error:
-                named = "" if error.entry == entry else f"{error.entry}: "
-                raise InputError(entry_of(keys[k]), f"{named}{error.allowed}") from None
-        family = ParametrisedScenario(scenario, [entry for _, entry, _ in entries])
-        factors = np.array([factor for *_, factor in entries], dtype=float)
-        return cls(family, np.array([k for k, *_ in entries], dtype=np.intp), factors)
-
-
-@lru_cache(maxsize=32)
-def _with_values(part: ScenarioPart, values: tuple[float, ...]) -> Scenario:
-    """Return the scenario with other values; the limits of a place, and its recordings, ask for the same in turn."""
-    return part.family.with_values(values)
-
-
-def with_parameters(scenario: Scenario, values: Mapping[str, float]) -> Scenario:
-    """Return a scenario with values of parameters that all recordings share, by key."""
-    for key in filter(recording_pattern, values):
-        raise InputError(key, "is of recordings, and this is a number of the scenario for all of them")
-    return ScenarioPart.from_keys(scenario, None, tuple(values)).scenario_at(np.array([*values.values()], dtype=float))
-
-
-def scenario_parts(
-    recordings: Sequence[tuple[Scenario, str]], keys: Sequence[str], fixed: Mapping[str, float]
-) -> list[ScenarioPart]:
-    """Return the scenarios of every recording; those of one scenario on which the same keys act share them.
-
-    Args:
-        recordings: Scenario and name of each.
-        keys: Parameters that are keys of a scenario.
-        fixed: Values that every scenario is given first, by key.
-    """
-    shared = dict[tuple[int, tuple[str, ...]], ScenarioPart]()
-    parts = []
-    for original, name in recordings:
-        place = id(original), tuple(key for key in keys if acts_on(key, name))
-        if place not in shared:
-            scenario = with_parameters(original, fixed) if fixed else original
-            shared[place] = ScenarioPart.from_keys(scenario, name, keys)
-        parts.append(shared[place])
-    return parts
 
 
 def tied_entries(key: str) -> list[tuple[str, float]]:
@@ -221,19 +136,6 @@ def check_shadowing(recording: str, settings: RecordingSettings, keys: Sequence[
             if hidden is not None:
                 allowed = f"is found or held for all recordings as {hidden}; leave out one of them"
                 raise InputError(f"identify.recordings.{recording}.{group}.{key}", allowed)
-
-
-def with_recorded_values(scenario: Scenario, recording: str, settings: RecordingSettings) -> Scenario:
-    """Return the scenario of a recording, with the parameters that belong to it alone."""
-    for key, value in settings.values.items():
-        try:
-            scenario = ParametrisedScenario(scenario, (key,)).with_values([value])
-        except InputError as error:
-            named = "" if error.entry == key else f"{error.entry}: "
-            raise InputError(
-                f"identify.recordings.{recording}.values.{key}", f"{named}{error.allowed}", value
-            ) from None
-    return scenario
 
 
 def _overlap(first_key: str, second_key: str) -> bool:

@@ -1,9 +1,9 @@
-"""Models of recordings, and the problem of those that are to be fitted."""
+"""Models of recordings, and their residuals."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,41 +11,50 @@ from numpy.typing import NDArray
 from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
-from finger_pin.identification.imposed_motions import ImposedMotion
-from finger_pin.identification.motions import RecordedMotion
-from finger_pin.identification.problem import Problem
-from finger_pin.identification.recordings import RecordedSignal, Recording, RecordingModel, check_angles, unit_of
-from finger_pin.identification.scenario_parameters import (
-    acts_on,
-    corrected_column,
-    entry_of,
-    key_in,
-    scenario_key,
-    with_recorded_values,
+from finger_pin.identification.parameters.keys import acts_on, corrected_column, entry_of, key_in, scenario_key
+from finger_pin.identification.parameters.parameters import Bounds, Parameters
+from finger_pin.identification.parameters.scenarios import with_recorded_values
+from finger_pin.identification.residuals.imposed_motions import ImposedMotion
+from finger_pin.identification.residuals.motions import RecordedMotion
+from finger_pin.identification.residuals.recordings import (
+    RecordedSignal,
+    Recording,
+    RecordingModel,
+    check_angles,
+    unit_of,
 )
-from finger_pin.identification.steady_data import SteadyReadings
+from finger_pin.identification.residuals.residuals import Residuals
+from finger_pin.identification.residuals.steady_data import SteadyReadings
 from finger_pin.mechanism.coerce import with_parameters_of
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
 
 
-def build_problem(
+def fitted_residuals(
     scenario: Scenario, settings: IdentifySettings, recordings: Sequence[Recording], finger: Finger | None = None
-) -> Problem:
-    """Return the problem whose objective is to be minimised."""
-    models, signals = recording_models(scenario, recordings, finger, [~held_out_rows(each) for each in recordings])
+) -> Residuals:
+    """Return the residuals of the fitted parts of recordings, for the parameters of a bench."""
     bounds = settings.bounds
-    low, high = np.array(list(bounds.values()), dtype=float).T
+    models, signals = recording_models(scenario, recordings, finger, [~held_out_rows(each) for each in recordings])
     count = sum(len(signal.measured) for signal in signals)
-    if count <= len(low):
-        raise InputError("identify.recordings", f"have {count} readings for {len(low)} parameters: more are needed")
-    problem = Problem(scenario, tuple(bounds), low, high, models, signals, {})
+    if count <= len(bounds):
+        raise InputError("identify.recordings", f"have {count} readings for {len(bounds)} parameters: more are needed")
+    residuals = Residuals(scenario, Parameters(bounds, models), models, signals)
     for model in models:
         _check_corrections(model, bounds)
-    return problem
+    return residuals
 
 
-def _check_corrections(model: RecordingModel, bounds: Mapping[str, tuple[float, float]]) -> None:
+def held_out_residuals(scenario: Scenario, bounds: Bounds, recording: Recording, finger: Finger | None) -> Residuals:
+    """Return the residuals of the held-out part of a recording, for parameters within bounds."""
+    models, signals = recording_models(scenario, [recording], finger, [held_out_rows(recording)])
+    if not any(len(signal.measured) for signal in signals):
+        entry = f"identify.recordings.{recording.name}.held_out"
+        raise InputError(entry, "has no samples", recording.settings.held_out)
+    return Residuals(scenario, Parameters(bounds, models), models, signals)
+
+
+def _check_corrections(model: RecordingModel, bounds: Bounds) -> None:
     """Refuse bounds of an output's scale that reach 0, and of inputs with which a recording cannot be computed."""
     name = model.recording.name
     for key, (low, high) in bounds.items():

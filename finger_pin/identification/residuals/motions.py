@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Collection, Mapping
 from contextlib import suppress
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,17 +15,16 @@ from finger_pin.core.steps.trajectory import Trajectory
 from finger_pin.description.loading import read_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError, IntegrationError
-from finger_pin.identification.recorded_inputs import (
-    check_reachable,
+from finger_pin.identification.parameters.keys import Corrections, corrections
+from finger_pin.identification.parameters.parameters import NuisanceParameter, ScenarioMap
+from finger_pin.identification.residuals.recorded_inputs import (
     check_references,
     far_start_warning,
     put_inputs,
     recorded_starts,
-    start_parameters,
     with_corrected_inputs,
 )
-from finger_pin.identification.recordings import Recording, ScenarioMap, wraparound_warning
-from finger_pin.identification.scenario_parameters import Corrections, NuisanceParameter, corrections
+from finger_pin.identification.residuals.recordings import RANGE_MARGIN, Recording, RecordingModel, wraparound_warning
 from finger_pin.mechanism.coerce import with_parameters_of
 from finger_pin.mechanism.finger import Finger
 from finger_pin.simulation.recording import RunArrays
@@ -43,11 +42,13 @@ _LEAST_TOLERANCE, GREATEST_TOLERANCE = 1e-10, 1e-4
 # Slope, in ranges of the signal over the range of the parameter, above which it is computed by runs with their own time
 # steps, and the change of the parameter for that, part of its range.
 _STEEP_SLOPE, _LARGE_CHANGE = 30.0, 1e-3
+# Half range of an estimated start about the recorded one, rad.
+_START_MARGIN = 0.3
 # Steps per row of a recording from which on a run is slow.
 _SLOW_STEPS_PER_ROW = 4
 
 
-class RecordedMotion:
+class RecordedMotion(RecordingModel):
     """Recorded motion, or a window of one, compared with a scenario.
 
     Attributes:
@@ -70,7 +71,6 @@ class RecordedMotion:
         self._entry = f"identify.recordings.{recording.name}"
         self._start_time = float(recording.time[rows[0]])
         self._times = recording.time[rows] - self._start_time
-        self.nuisance_parameters: tuple[NuisanceParameter, ...] = ()
         self._read_imposed_motion(scenario)
         table = copy.deepcopy(scenario.model_dump(mode="python", exclude_unset=True, exclude_none=True))
         put_inputs(table, recording, scenario)
@@ -118,18 +118,14 @@ class RecordedMotion:
         run = self._run(scenario, nuisance, self._tolerance_factor)[1]
         return "" if run is None else run[0].ringing(run[1], _SLOW_STEPS_PER_ROW * len(self.rows))
 
-    def scale_tolerances(self, factor: float) -> None:
-        """Multiply the scenario's tolerances by a factor from now on."""
-        self._tolerance_factor = factor
+    def with_tolerances(self, factor: float) -> Self:
+        """Return the model with the scenario's tolerances multiplied by a factor."""
+        twin = copy.copy(self)
+        twin._tolerance_factor = factor
+        return twin
 
     def slopes(self, scenario_map: ScenarioMap, values: Array, sizes: Array) -> list[Array]:
-        """Return the derivatives of the outputs by the values, shape (m, p) each.
-
-        Args:
-            scenario_map: Maps values to a scenario and the numbers of this motion.
-            values: Values of the parameters, shape (p,).
-            sizes: Sizes of changes of the values, shape (p,).
-        """
+        """Return the derivatives of the outputs by the values, shape (m, p) each, along the steps of one run."""
         current = scenario_map(values)
         factor = max(self._tolerance_factor, _SLOPE_TOLERANCE)
         base_outputs, motion = self._run(*current, factor)
@@ -229,34 +225,16 @@ class RecordedMotion:
         corrected = {key: corrections(self.recording.name, key, nuisance) for key in settings}
         delays = {key: each.delay + corrected[key].delay for key, each in settings.items()}
         by_delay = {delay: self._at_delay(setup, trajectory, delay, delays) for delay in dict.fromkeys(delays.values())}
-        return [corrected[key].column(self._column(by_delay[delay], key)) for key, delay in delays.items()]
+        return [
+            corrected[key].column(labelled(by_delay[delay], key, f"{self._entry}.outputs"))
+            for key, delay in delays.items()
+        ]
 
     def _at_delay(self, setup: Setup, trajectory: Trajectory, delay: float, delays: Mapping[str, float]) -> RunArrays:
         """Return the variables of the outputs with a delay, at the instants before it."""
         names = dict.fromkeys(key.partition(".")[0] for key, lag in delays.items() if lag == delay)
         times = np.clip(self._times - delay, 0.0, float(trajectory.breakpoints[-1]))
         return setup.record(trajectory, times, tuple(names), f"{self._entry}.outputs")
-
-    def _column(self, arrays: RunArrays, name: str) -> Array:
-        """Return a column of a variable by its labels, or the difference of two, as in ``spool_tension.A-B``."""
-        variable, _, label = name.partition(".")
-        values, (dims, *_) = arrays[variable], arrays.variables[variable]
-        parts = label.split(".") if len(dims) > 2 else [label]
-        if len(parts) != max(len(dims) - 1, 1):
-            raise InputError(
-                f"{self._entry}.outputs.{name}", f"must be {'.'.join((variable, *map(str.upper, dims[1:])))}"
-            )
-        for axis, dim in reversed(list(enumerate(dims))[1:]):
-            labels, label = [str(each) for each in arrays[dim]], parts[axis - 1]
-            # A pair of bodies in contact has a name with a hyphen.
-            columns = [label] if label in labels else label.split("-")
-            missing = next((each for each in columns if each not in labels), None)
-            if missing is not None or len(columns) > 2:
-                allowed = f"there is no {missing or label}; there are {', '.join(labels)}, and A-B for a difference"
-                raise InputError(f"{self._entry}.outputs.{name}", allowed)
-            first, *rest = (np.take(values, labels.index(each), axis=axis) for each in columns)
-            values = first - rest[0] if rest else first
-        return values
 
     def _set_start(self, table: dict[str, Any], scenario: Scenario, window: int) -> None:
         kind, entry = self.recording.settings.start, f"{self._entry}.start"
@@ -265,13 +243,48 @@ class RecordedMotion:
             return
         if not self._starts:
             raise InputError(entry, "needs joint_position among the outputs", kind)
-        starts = {joint: each.corrected(self.recording.name, {}) for joint, each in self._starts.items()}
-        check_reachable(entry, starts, scenario)
+        name = self.recording.name
+        starts = {joint: each.corrected(name, {}) for joint, each in self._starts.items()}
+        for joint, (angle, _) in starts.items():
+            low, high = scenario.finger.joints[joint].range
+            if not low - RANGE_MARGIN <= angle <= high + RANGE_MARGIN:
+                allowed = f"{joint} begins at {angle:.3g} rad, and its range is {low:.3g} to {high:.3g}"
+                raise InputError(entry, f"cannot be reached: {allowed}")
         initial = table["simulation"].setdefault("initial", {})
-        for k, name in enumerate(("position", "velocity")):
-            initial[name] = {**initial.get(name, {}), **{joint: start[k] for joint, start in starts.items()}}
+        for k, what in enumerate(("position", "velocity")):
+            initial[what] = {**initial.get(what, {}), **{joint: start[k] for joint, start in starts.items()}}
         if kind == "found":
-            self.nuisance_parameters = start_parameters(self.recording.name, window, starts)
+            self.nuisance_parameters = [
+                NuisanceParameter(f"recordings.{name}.start.{window}.{joint}", q - _START_MARGIN, q + _START_MARGIN, q)
+                for joint, (q, _) in starts.items()
+            ]
+
+
+def labelled(run: RunArrays, name: str, entry: str, values: Array | None = None) -> Array:
+    """Return a signal of a run by its labels, shape (m,), or the difference of two, as in ``spool_tension.A-B``.
+
+    Args:
+        run: The run.
+        name: The signal.
+        entry: Which an error names.
+        values: In place of those of the variable, shape (m, labels of its dimensions, ...).
+    """
+    variable, _, label = name.partition(".")
+    values, (dims, *_) = run[variable] if values is None else values, run.variables[variable]
+    parts = label.split(".") if len(dims) > 2 else [label]
+    if len(parts) != max(len(dims) - 1, 1):
+        raise InputError(f"{entry}.{name}", f"must be {'.'.join((variable, *map(str.upper, dims[1:])))}")
+    for axis, dim in reversed(list(enumerate(dims))[1:]):
+        labels, label = [str(each) for each in run[dim]], parts[axis - 1]
+        # A pair of bodies in contact has a name with a hyphen.
+        columns = [label] if label in labels else label.split("-")
+        missing = next((each for each in columns if each not in labels), None)
+        if missing is not None or len(columns) > 2:
+            allowed = f"there is no {missing or label}; there are {', '.join(labels)}, and A-B for a difference"
+            raise InputError(f"{entry}.{name}", allowed)
+        first, *rest = (np.take(values, labels.index(each), axis=axis) for each in columns)
+        values = first - rest[0] if rest else first
+    return values
 
 
 def _with_scaled_tolerances(scenario: Scenario, factor: float) -> Scenario:

@@ -1,0 +1,1 @@
+"""Parameters of an identification: numbers of scenarios within bounds."""

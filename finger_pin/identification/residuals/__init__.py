@@ -1,0 +1,1 @@
+"""Residuals: recordings less what models compute at values of the parameters."""

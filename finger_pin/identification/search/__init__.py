@@ -1,0 +1,1 @@
+"""Search for the least residuals, a function of a vector within bounds."""
