@@ -119,6 +119,50 @@ def test_a_motor_is_found_under_a_supply_that_sags_beside_its_goal():
     assert found[1] == pytest.approx(0.5, rel=5e-3) and abs(found[0] - 0.5) > 0.05, found
 
 
+@pytest.mark.slow
+def test_a_motor_is_found_from_the_speeds_that_a_servo_in_velocity_mode_was_sent():
+    """PI on the speed, U = V (k_d (w* - w) + k_i int (w* - w)), of a motor that unwinds a slack cord, by scipy."""
+    time = np.arange(0.0, 0.6, 0.005)
+    speed = -np.select([time < 0.2, time < 0.4], [2.0, 6.0], 3.0)
+
+    def rates(t, x):
+        error = speed[np.searchsorted(time, t, side="right") - 1] - x[1]
+        voltage = 7.0 * (0.05 * error + 0.5 * x[2])
+        return x[1], (0.5 * (voltage - 0.5 * x[1]) / 5.0 - 0.01 * x[1]) / 2e-3, error
+
+    angle = solve_ivp(rates, (0.0, 0.6), [0.3, 0.0, 0.0], t_eval=time, rtol=1e-9, atol=1e-12, max_step=1e-3).y[0]
+    overrides = {
+        "finger.actuators.servo.motor": {
+            **{"voltage": 7.0, "torque_constant": 0.4, "resistance": 5.0, "maximum_current": 3.0, "inertia": 2e-3},
+            **{"friction": {"coulomb": 0.0, "viscous": 0.01}, "encoder": {"range": [-60.0, 9.0]}},
+        },
+        "finger.actuators.servo.position_loop": {"proportional": 0.5, "derivative": 0.05, "period": 0.0005},
+    }
+    goal = {"column": "speed", "unit": "deg/s", "integrate": True}
+    told = {"time": "t", "inputs": {"spool_angle.servo": goal}, "outputs": {"motor_position.servo": "angle"}}
+    result = fp.identify(
+        "wound",
+        parameters={"finger.actuators.servo.motor.torque_constant": (0.2, 0.9)},
+        recordings={"free": told},
+        data={"free": {"t": time, "speed": np.rad2deg(speed), "angle": angle - 0.3}},
+        overrides=overrides,
+        starts=1,
+        profiles=False,
+        refits=False,
+    )
+    assert float(result.estimate[0]) == pytest.approx(0.5, rel=0.01)
+
+
+def test_the_integral_of_a_speed_begins_where_the_motor_stands():
+    told = {"inputs": {"spool_angle.M1": {"column": "pwm", "integrate": True}}}
+    # Rows 0 and 0.1 s: 50 rad/s for 0.1 s.
+    np.testing.assert_allclose(recording(told).inputs["spool_angle.M1"], [0.0, 5.0])
+    moved = told | {"outputs": {"motor_position.M1": {"column": "angle", "offset": 0.7}}}
+    np.testing.assert_allclose(recording(moved).inputs["spool_angle.M1"], [0.7, 5.7])
+    with pytest.raises(fp.InputError, match=r"motor_voltage\.M1\.integrate = true: is for inputs spool_angle and"):
+        recording({"inputs": {"motor_voltage.M1": {"column": "pwm", "integrate": True}}})
+
+
 @pytest.mark.parametrize(
     ("column", "values", "what", "bounds", "said"),
     [

@@ -38,6 +38,10 @@ def _held_out(value: Any) -> bool | tuple[float, float] | dict[str, Any]:
     return float(value[0]), float(value[1])
 
 
+# Inputs that may be given by their rate.
+_GOALS = ("spool_angle", "tendon_winding")
+
+
 class Column(Description):
     """A column of a recording: SI value = scale times the number in its unit, plus offset; in a file a name will do."""
 
@@ -86,6 +90,12 @@ class Column(Description):
         False,
         strict=True,
         description="Inputs of motions: each reading holds until the next, as the goal that a servo was sent.",
+    )
+    integrate: bool = Field(
+        False,
+        strict=True,
+        description="Inputs spool_angle and tendon_winding of motions: the column is a speed, as a servo in velocity "
+        "mode is sent, held from row to row; its integral begins at the motor's position where that is an output.",
     )
     smoothing: Annotated[float, real(0.0, 1e3)] | None = quantity(
         None,
@@ -171,6 +181,11 @@ class RecordingSettings(TableFormat):
             smooth = self.imposed and name.startswith(f"inputs.{IMPOSED}.")
             if isinstance(column, Column) and column.hold and (smooth or not self._is_motion_input(name)):
                 raise problem(f"{name}.hold", f"is for inputs of motions other than {IMPOSED} only", True)
+            if isinstance(column, Column) and column.integrate:
+                goal = name.removeprefix("inputs.").partition(".")[0] in _GOALS and self._is_motion_input(name)
+                if not goal or column.hold:
+                    allowed = f"is for inputs {' and '.join(_GOALS)} of motions only, without hold"
+                    raise problem(f"{name}.integrate", allowed, True)
             if isinstance(column, Column) and not smooth and column.smoothing is not None:
                 raise problem(f"{name}.smoothing", f"is for inputs {IMPOSED} of motions only", column.smoothing)
             if isinstance(column, Column) and smooth and column.smoothing is None:

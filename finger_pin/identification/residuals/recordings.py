@@ -197,6 +197,12 @@ def read_recording(
     groups = {"inputs": settings.inputs, "outputs": settings.outputs}
     columns = {(group, key): column for group, each in groups.items() for key, column in each.items()}
     signals = {place: _signal(table, *place, column) for place, column in columns.items()}
+    for (group, key), column in columns.items():
+        if column.integrate:
+            label, turned = key.partition(".")[2], np.cumsum(signals[group, key][:-1] * np.diff(time))
+            measured = signals.get(("outputs", f"motor_position.{label}"), np.zeros(1))
+            start = float(measured[np.isfinite(measured)][0]) if np.isfinite(measured).any() else 0.0
+            signals[group, key] = start + np.append(0.0, turned)
     return Recording(
         name,
         settings,
@@ -206,7 +212,11 @@ def read_recording(
         speed,
         frozenset(key for (_, key), column in columns.items() if not table.names_unit(column)),
         held_out,
-        {key: table.turn(f"{group}.{key}", each) for (group, key), each in columns.items() if unit_of(key) == "rad"},
+        {
+            key: table.turn(f"{group}.{key}", each)
+            for (group, key), each in columns.items()
+            if unit_of(key) == "rad" and not each.integrate
+        },
     )
 
 
@@ -240,7 +250,8 @@ def check_angles(recording: Recording, scenario: Scenario) -> None:
 
 def _signal(table: Table, group: str, name: str, column: Column) -> Array:
     """Return a column in SI; cells of outputs may be empty, and angles of joints are asked about."""
-    values = table.column(f"{group}.{name}", column, unit_of(name), missing=group == "outputs")
+    unit = f"{unit_of(name)}/s" if column.integrate else unit_of(name)
+    values = table.column(f"{group}.{name}", column, unit, missing=group == "outputs")
     if name.startswith("joint_position.") and np.nanmax(np.abs(values), initial=0.0) > MOST_ANGLE:
         allowed = f"angles must be at most {MOST_ANGLE:g}{IN_RADIANS}"
         raise InputError(f"{table.entry}.{group}.{name}", allowed, float(np.nanmax(np.abs(values))))
