@@ -115,7 +115,7 @@ def _push(structure: Structure, linear: Linear, k: int, full: int, row: Vector) 
         _add_scaled(linear.force[linear.blocks.place[structure.arm_at[e]]], linear.arm[e], row, full)
 
 
-@njit_inline
+@njit_always_inline
 def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) -> bool:
     """Fill the gains of a block's rows and states, and sum up A^T d phi; false if states that are read are singular."""
     structure, parameters = model.structure, model.parameters
@@ -194,7 +194,7 @@ def condense(address: int, g: float) -> int:
     return 1
 
 
-@njit_inline
+@njit_always_inline
 def _condense_block(model: Model, address: int, g: float, b: int) -> bool:
     """Fill the rows of the solution that belong to a block."""
     linear, blocks = model.linear, model.linear.blocks

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from finger_pin.core.evaluation.blocks import factorise, substitute
-from finger_pin.core.jit import Vector, njit_inline
+from finger_pin.core.jit import Vector, njit_always_inline, njit_inline
 from finger_pin.core.tables.linear_systems import Linear
 from finger_pin.core.tables.mechanism_parameters import Parameters
 from finger_pin.core.tables.structure import Structure
@@ -18,7 +18,7 @@ def add_readings(structure: Structure, parameters: Parameters, k: int, slope: fl
         out[wide + structure.read_place[structure.read_at[e]]] += slope * parameters.read_weight[e]
 
 
-@njit_inline
+@njit_always_inline
 def resolve_readings(structure: Structure, linear: Linear, b: int, width: int, wide: int) -> bool:
     """Solve for the changes of the states that rows of a block read, and put them into its gains; false if singular."""
     blocks, matrix, solved, reads = linear.blocks, linear.read_matrix, linear.read_gain, structure.read_states.size

@@ -47,7 +47,7 @@ def _coriolis_block(inertia: Vector, motion: Vector, out: Vector) -> None:
     out[11] = m * uz + wx * hy - wy * hx
 
 
-@njit_inline
+@njit_always_inline
 def inverse_dynamics_derivatives(structure: Structure, velocity: Vector, work: Work) -> None:
     """Fill the derivatives of inverse dynamics by position and velocity after `inverse_dynamics` and `mass_matrix`.
 
