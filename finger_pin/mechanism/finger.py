@@ -77,7 +77,8 @@ class Finger:
         self.description = description = describe(description)
         self.constructor_args = ConstructorArgs(rigid_body, tuple(rows), objects, dict(tables or {}))
         self.rigid_body, self.paths = build_body(description, rigid_body)
-        check_joints(self.rigid_body, description)
+        if rigid_body is not None:
+            check_joints(rigid_body, description)
         parts = Parts.from_description(description)
         self.routing, self.tendons, self.actuators, self.joint_friction, self.stroke_limiter, self.springs = parts
         self._excursions = Excursions(self.routing, description, self.paths)

@@ -75,7 +75,7 @@ class RigidBody:
             self.parent_links.append(self.parent_links[parent] if shared else parent)
             self.proximal_axes.append(self.proximal_axes[parent] if shared else offset / length)
 
-    @property
+    @cached_property
     def slides(self) -> tuple[bool, ...]:
         """Return whether each joint of the model slides, so that its position is in m."""
         return tuple(joint.shortname().startswith("JointModelP") for joint in self.model.joints[1:])

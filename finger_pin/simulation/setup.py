@@ -216,6 +216,7 @@ class Setup:
             rtol=tolerances.rtol,
             atol_scale=tolerances.atol_scale,
             reused=reused,
+            evaluator=loop.dynamics,
         )
 
     @property

@@ -121,7 +121,7 @@ class Simulator:
         rest, force = finger.rest_state(np.zeros(len(finger.routing.joints))), self.loop.fingertip_force
         settings = {name: getattr(scenario.simulation, name) for name in ("method", "rtol", "atol_scale")}
         given = finger, sampled_control(self.loop), rest, force
-        self._stepper = Stepper.from_finger(*given, **settings, reused=reused[1])
+        self._stepper = Stepper.from_finger(*given, **settings, reused=reused[1], evaluator=self.loop.dynamics)
         self._initial_snapshot = self._stepper.state_snapshot
 
     def _state_at_rest(self, position: Array) -> Array:

@@ -7,7 +7,7 @@ Vector Algebra, IEEE RA-L 7 (2022), in the conventions of `rigid_body`.
 from __future__ import annotations
 
 from finger_pin.core.addresses.spatial import add_force_cross, apply_inertia, dot, motion_cross
-from finger_pin.core.jit import Vector, njit_always_inline, njit_inline
+from finger_pin.core.jit import Vector, njit_always_inline
 from finger_pin.core.tables.buffers import Work
 from finger_pin.core.tables.structure import Structure
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from finger_pin.core.evaluation.attitude_charts import Charts
 from finger_pin.core.jit import copied
+from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.core.stepping.drives import Drives
 from finger_pin.core.stepping.island_stepper import FIRST_STEP, IslandIntegrator, StartValues, failure
 from finger_pin.core.steps import integration as core
@@ -18,6 +19,7 @@ from finger_pin.core.steps.tableaus import Tableau, rodas4, rodas5p
 from finger_pin.core.tables.inputs import HELD, InputTable
 from finger_pin.core.tables.islands import Island, selections
 from finger_pin.core.tables.mechanism_parameters import Parameters, compile_mechanism
+from finger_pin.core.tables.structure import Structure
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.threads import in_threads
@@ -47,6 +49,7 @@ class Stepper:
         atol: Array,
         force: Array | None = None,
         time: float = 0.0,
+        compiled: tuple[Structure, Parameters] | None = None,
     ) -> None:
         """Start from a state.
 
@@ -59,8 +62,9 @@ class Stepper:
             atol: Absolute tolerances, shape (mechanism.size,); of a quaternion the first counts.
             force: At the tips, shape (3,) or (t, 3), N, base frame.
             time: When, s.
+            compiled: What `compile_mechanism` has made of the mechanism, if it is there.
         """
-        structure, parameters = compile_mechanism(mechanism)
+        structure, parameters = compiled or compile_mechanism(mechanism)
         laws = [table.law for table in mechanism.rows]
         self._charts, self._width = Charts.from_mechanism(mechanism), mechanism.coordinates
         self._structure, self._selected = structure, selections(structure, control)
@@ -88,12 +92,13 @@ class Stepper:
         atol: Array,
         force: Array | None = None,
         time: float = 0.0,
+        compiled: tuple[Structure, Parameters] | None = None,
     ) -> bool:
         """Start anew, bit for bit as a new stepper of these; return False, and be of no use, if more differs.
 
         Its arguments are those of the constructor.
         """
-        structure, parameters = compile_mechanism(mechanism)
+        structure, parameters = compiled or compile_mechanism(mechanism)
         same = structure is self._structure and selections(structure, control) is self._selected
         if not same or tableau is not self._made_of[3] or rtol != self._made_of[4]:
             return False
@@ -128,6 +133,7 @@ class Stepper:
         rtol: float,
         atol_scale: float,
         reused: Stepper | None = None,
+        evaluator: object = None,
     ) -> Stepper:
         """Return the stepper of a finger under inputs, from a packed state on.
 
@@ -140,9 +146,13 @@ class Stepper:
             rtol: Relative tolerance.
             atol_scale: Absolute tolerance over the scale of each kind of state.
             reused: A stepper that is not needed any more: it is returned, if its finger differs in numbers only.
+            evaluator: If it is one of the same mechanism, its structure and parameters are taken.
         """
-        given = finger.mechanism, control, x, TABLEAUS[method](), rtol, atol_scale * finger.layout.scales(), force
-        return reused if reused is not None and reused.rebind(*given) else cls(*given)
+        given = finger.mechanism, control, x, TABLEAUS[method](), rtol, atol_scale * finger.layout.scales(), force, 0.0
+        compiled = None
+        if isinstance(evaluator, CompiledFinger) and evaluator.finger is finger:
+            compiled = evaluator.mechanism.structure, evaluator.mechanism.parameters
+        return reused if reused is not None and reused.rebind(*given, compiled) else cls(*given, compiled)
 
     def _places(self, island: Island) -> NDArray[np.int64]:
         """Return the indices of an island's numbers in the whole state."""
