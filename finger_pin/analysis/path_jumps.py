@@ -122,17 +122,10 @@ def _unexplained(first: Array, second: Array, step: Array | float) -> Array:
 
 def _wraps(finger: Finger) -> list[tuple[str, str, PathTerm]]:
     """Return the cords' legs over wraps, with the names of cord and wrap."""
-    found = []
-    for cord, tendon in finger.description.tree.tendons.items():
-        legs, before, wrap = iter(finger.paths.routes[cord].legs), False, ""
-        for name, waypoint in (tendon.path or {}).items():
-            if waypoint.kind == "pulley":
-                before = False
-            elif waypoint.kind == "point":
-                leg = next(legs) if before else None
-                if leg is not None and wrap:
-                    found.append((cord, wrap, leg))
-                before, wrap = True, ""
-            else:
-                wrap = name
-    return found
+    return [
+        (name, leg.wrap[0], finger.paths.terms[leg])
+        for name, cord in finger.paths.cords.items()
+        for part in cord.parts
+        for leg in part.elements
+        if leg.wrap is not None
+    ]

@@ -137,14 +137,17 @@ class FingerDescription(Description):
             return self.hand.bodies
         return self.tree if self.tree.bodies else tree_of_links(self.joints, self.tendons)
 
+    # Read once: routing, rows, drawing and export ask for it.
+    @memoised(lambda self, name: (name, self.tendon_friction.place, self.tendons.get(name), self.tree), most=256)
     def cord(self, name: str) -> Cord:
         """Return one of its tendons as a cord, or else a tendon of its tree that something else pulls."""
         tendon = self.tendons.get(name)
-        if tendon is None or tendon.along is not None:
-            cord = self.tree.cord(name if tendon is None else str(tendon.along))
-            offset = 0.0 if tendon is None else tendon.curvature_offset
-            return cord._replace(curvature_offset=cord.curvature_offset + offset)
-        return Cord.of_crossings(tendon)
+        at_bends = self.tendon_friction.place == "bends" and (tendon is None or tendon.kind == "actuated")
+        if tendon is None:
+            return self.tree.cord(name, at_bends=at_bends)
+        if tendon.along is not None:
+            return self.tree.cord(tendon.along, curvature_offset=tendon.curvature_offset, at_bends=at_bends)
+        return Cord.of_crossings(tendon, at_bends=at_bends)
 
     @property
     def through_space(self) -> bool:

@@ -14,7 +14,6 @@ import scipy
 from numpy.typing import NDArray
 
 from finger_pin.description.caching import cached_property, memoised
-from finger_pin.description.cords import CordElement
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.typing import Array, Indices
 
@@ -65,43 +64,21 @@ class Routing:
         """Build the matrices from the crossings of every tendon."""
         joints, tendons = tuple(description.joints), tuple(description.tendons)
         names = [""] if description.hand is None else [f"{name}." for name in description.hand.fingers]
-        column = {name: index for index, name in enumerate(joints)}
         cords = [description.cord(name) for name in tendons]
-        # Where tendons rub at their bends, none does beyond the last element that moves it.
-        at_bends = description.tendon_friction.place == "bends"
-        elements = [
-            cord.parts[0].sliding() if at_bends and tendon.kind == "actuated" else cord.elements
-            for cord, tendon in zip(cords, description.tendons.values(), strict=True)
-        ]
+        strands = [strand for cord in cords for strand in cord.strands]
 
-        def sums(elements: Iterable[CordElement], value: str) -> Array:
-            row = np.zeros(len(joints))
-            for element in elements:
-                if element.radius is not None:
-                    row[column[element.name]] += getattr(element, value)
-            return row
+        def rows(values: Iterable[Array]) -> Array:
+            return np.array([*values]).reshape(-1, len(joints))
 
-        strands, loads = [], []
-        for cord, tendon in zip(cords, description.tendons.values(), strict=True):
-            split = tendon.proximal_crossings
-            ends = [(0, None)] if tendon.kind == "actuated" else [(0, split), (split, None)]
-            for first, last in ends:
-                strands.append(sums(cord.elements[first:last], "radius"))
-                loads.append(list(cord.shares(joints, first, last)))
         return cls(
             joints=joints,
             tendons=tendons,
             actuated=len(description.actuated_names),
-            coupling=np.array([sums(cord.elements, "radius") for cord in cords]).reshape(-1, len(joints)),
-            strand_coupling=np.array(strands).reshape(-1, len(joints)),
-            curvature_matrix=np.array([sums(each, "turn") for each in elements]).reshape(-1, len(joints)),
-            curvature_offset=np.array(
-                [
-                    cord.curvature_offset + sum(element.curvature_offset for element in each)
-                    for cord, each in zip(cords, elements, strict=True)
-                ]
-            ),
-            loads=np.array(loads, dtype=float).reshape(-1, len(joints)).T,
+            coupling=rows(cord.arms(joints) for cord in cords),
+            strand_coupling=rows(strand.arms(joints) for strand in strands),
+            curvature_matrix=rows(cord.sliding.turns(joints) for cord in cords),
+            curvature_offset=np.array([cord.sliding.offset for cord in cords]),
+            loads=rows(strand.loads(joints) for strand in strands).T,
             fingers=tuple((_beginning(joints, name), _beginning(tendons, name)) for name in names),
             winched=np.array(
                 [description.tendons[name].winch is not None for name in description.actuated_names], bool

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field, model_validator
 from scipy.spatial.transform import Rotation
 
-from finger_pin.description.cords import Cord, CordElement, CordPart
+from finger_pin.description.cords import Cord, CordElement
 from finger_pin.description.meshes import Mesh
 from finger_pin.description.objects import Object
 from finger_pin.description.placement import PathSignal
@@ -129,21 +129,27 @@ class Tree(Description):
         moved = {name: self.objects[name].updated(**dict(state)) for name, state in states.items()}
         return self.objects | moved
 
-    def cord(self, tendon: str) -> Cord:
-        """Return a tendon as a cord: its arms on joints, where it winds about them, then the legs of its path."""
+    def cord(self, tendon: str, *, curvature_offset: float = 0.0, at_bends: bool = False) -> Cord:
+        """Return a tendon as a cord: its arms on joints, where it winds about them, then the legs of its path.
+
+        Some ``curvature_offset``, rad, is added to its own; with ``at_bends`` it rubs at each of its bends.
+        """
         described = self.tendons[tendon]
-        path, coefficients = described.path, described.joints or {}
         # A sum of joint positions that is no cord, or that stands beside a path, shows no bend.
-        winds = path is None and self._is_cord(tendon)
+        winds = float(described.path is None and self._is_cord(tendon))
         arms = (
-            CordElement.on_joint(joint, -gain, float(winds), bends=winds)
-            for joint, gain in coefficients.items()
+            CordElement(joint, frozenset({joint}), -gain, winds)
+            for joint, gain in (described.joints or {}).items()
             if gain
         )
-        (divisor, trunk), *branches = self._legs(path or {})
-        parts = [(divisor, (*arms, *trunk)), *branches]
-        cord_parts = tuple(CordPart(divisor, tuple(elements)) for divisor, elements in parts)
-        return Cord(cord_parts, described.curvature_offset, through_space=path is not None)
+        (_, trunk), *branches = self._legs(described.path or {})
+        return Cord(
+            (*arms, *trunk),
+            tuple(Cord(tuple(legs), divisor=divisor, at_bends=at_bends) for divisor, legs in branches),
+            curvature_offset=described.curvature_offset + curvature_offset,
+            through_space=described.path is not None,
+            at_bends=at_bends,
+        )
 
     @property
     def on_paths(self) -> dict[str, PathSignal]:
@@ -208,22 +214,22 @@ class Tree(Description):
     def _legs(self, path: Mapping[str, Waypoint]) -> list[tuple[float, list[CordElement]]]:
         """Return divisor and legs of every part of a path; a leg crosses the joints that move only one of its ends."""
         parts: list[tuple[float, list[CordElement]]] = [(1.0, [])]
-        before: set[str] | None = None
-        wrapped: set[str] | None = None
-        for waypoint in path.values():
+        before: Waypoint | None = None
+        wrap: tuple[str, Waypoint] | None = None
+        for key, waypoint in path.items():
             if waypoint.kind == "pulley":
-                before, wrapped = None, None
+                before = wrap = None
                 parts.append((waypoint.divisor, []))
             elif waypoint.kind != "point":
-                wrapped = self._movers(waypoint.body)
+                wrap = key, waypoint
             else:
-                movers, legs = self._movers(waypoint.body), parts[-1][1]
                 if before is not None:
-                    about = before if wrapped is None else wrapped
-                    crossed = frozenset((movers ^ before) | (about ^ before))
-                    bends = bool(legs) or wrapped is not None
-                    legs.append(CordElement(str(len(legs) + 1), crossed, bool(crossed), bends))
-                before, wrapped = movers, None
+                    legs, first = parts[-1][1], self._movers(before.body)
+                    about = self._movers(wrap[1].body) if wrap else first
+                    crossed = frozenset((self._movers(waypoint.body) ^ first) | (about ^ first))
+                    name, ends = str(len(legs) + 1), (before, waypoint)
+                    legs.append(CordElement(name, crossed, points=ends, wrap=wrap, follows=bool(legs)))
+                before, wrap = waypoint, None
         return parts
 
     @property
@@ -237,10 +243,8 @@ class Tree(Description):
         )
 
     def _is_cord(self, name: str) -> bool:
-        around = self.tendons[name].wound
-        return all(
-            self.joints[joint].kind == "hinge" and abs(radius) <= LARGEST_RADIUS for joint, radius in around.items()
-        )
+        around = self.tendons[name].wound.items()
+        return all(self.joints[joint].kind == "hinge" and abs(radius) <= LARGEST_RADIUS for joint, radius in around)
 
     def _is_pulled(self, name: str) -> bool:
         tendon = self.tendons[name]
@@ -254,24 +258,22 @@ class Tree(Description):
         way share its torque. Empty for cords that have a spring or an actuator of their own.
         """
         tendon = self.tendons[name]
-        around = {joint: radius for joint, radius in tendon.wound.items() if radius}
         driven = any(each.tendon == name for each in self.actuators.values())
-        if len(around) != 1 or driven or tendon.stiffness > 0.0:
+        if len(tendon.wound) != 1 or driven or tendon.stiffness > 0.0:
             return {}
-        ((joint, radius),) = around.items()
+        ((joint, radius),) = tendon.wound.items()
         sharing = sum(other * radius > 0.0 for other in self._radii_about(joint))
         drives = {key: each.gear for key, each in self.actuators.items() if each.joint == joint}
         return {key: -gear / (radius * sharing) for key, gear in drives.items()}
 
     def opposed(self, name: str) -> bool:
         """Return whether another cord pulls the other way about the only joint of a cord."""
-        ((joint, radius),) = ((key, each) for key, each in self.tendons[name].wound.items() if each)
+        ((joint, radius),) = self.tendons[name].wound.items()
         return any(other * radius < 0.0 for other in self._radii_about(joint))
 
     def _radii_about(self, joint: str) -> list[float]:
         """Return the radii of the cords that wind about one joint alone."""
-        tables = [{key: r for key, r in each.wound.items() if r} for each in self.tendons.values()]
-        return [table[joint] for table in tables if list(table) == [joint]]
+        return [each.wound[joint] for each in self.tendons.values() if [*each.wound] == [joint]]
 
     def joints_of(self, body: str) -> list[str]:
         """Return the joints of a body on its parent, in order."""

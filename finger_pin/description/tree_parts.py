@@ -195,7 +195,7 @@ class TreeTendon(Description):
     @property
     def wound(self) -> dict[str, float]:
         """Radii about the joints that it winds about, m, by joint; none with a path, which shows where it bends."""
-        return (self.joints or {}) if self.path is None else {}
+        return {joint: gain for joint, gain in (self.joints or {}).items() if gain and self.path is None}
 
 
 class Coupling(Description):

@@ -62,7 +62,8 @@ def _tendon_frictions(description: FingerDescription, tendons: Tendons, massless
     settings, numbers, frictions = description.tendon_friction, description.numbers["tendon_friction"], []
     for index, (name, tendon) in enumerate(description.tendons.items()):
         law = _coefficients(settings, numbers, "stiction_ratio", index, float(tendons.routing.curvature_offset[index]))
-        crossed = [(True, joint, float(each.bends)) for joint, each in tendon.crossings.items()]
+        cord = description.cord(name)
+        crossed = [(True, arm.name, arm.turn) for arm in cord.elements]
         if tendon.kind == "actuated":
             frictions.append(PluginFriction(TENDON, name, name, False, 1.0, law, tuple(crossed)))
         elif massless:
@@ -70,7 +71,7 @@ def _tendon_frictions(description: FingerDescription, tendons: Tendons, massless
             law = law._replace(viscous=0.0)
             frictions.append(PluginFriction(TENDON, name, name, False, 1.0, law, tuple(crossed)))
         else:
-            split, mass = tendon.proximal_crossings, f"{name}_mass"
+            split, mass = cord.mass_after, f"{name}_mass"
             halves = [(False, f"{name}_{half}", 0.0) for half in ("proximal", "distal")]
             elements = (halves[0], *crossed[:split], halves[1], *crossed[split:])
             frictions.append(PluginFriction(MASS, mass, mass, True, 1.0, law, elements))

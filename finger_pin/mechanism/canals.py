@@ -12,48 +12,39 @@ sum_k r_k theta_k' T_k = v_1 T_0 - sum_k v_k (T_(k-1) - T_k): what each wrap tak
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
+from finger_pin.description.cords import Cord
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.laws.capstan import CANAL_FRICTION, CORD_TENSION
 from finger_pin.mechanism.groups import BRANCHES, CANALS, CORDS, ELASTIC, TENDON_LOSSES, WRAPS
 from finger_pin.mechanism.rows import Rows
-from finger_pin.mechanism.tendon_paths import TendonPath, TendonPaths
-from finger_pin.mechanism.tendon_wraps import Wrap, find_wraps
+from finger_pin.mechanism.tendon_paths import TendonPaths
 from finger_pin.mechanism.tendons import BRISTLES, SLACK, SOURCES, Tendons
 from finger_pin.mechanism.tree_mechanism import actuator_table
 from finger_pin.typing import Array
 
 
-@dataclass
-class _Canal:
-    """A canal: its route, what pulls through it, and the joints whose pins its friction loads.
+class _Canal(NamedTuple):
+    """A canal, or one of the places where it rubs.
 
     Attributes:
         name: Of the tendon, and which branch.
         tendon: Index of its numbers of friction.
-        route: Along which it acts.
+        cord: Along which it acts.
         one_way: Whether what pulls never pushes.
-        crossed: Joints.
         sources: By table of earlier rows and the names of these, parts of their forces that are its tension.
-        offset: Curvature that its path does not show, rad.
-        bends: Curvature per joint angle, shape (n,), of a sum of joint positions.
         drag: Level without load, N.
-        wraps: The places where it rubs.
     """
 
     name: str
     tendon: int
-    route: TendonPath
+    cord: Cord
     one_way: bool
-    crossed: frozenset[str]
     sources: dict[tuple[str, str], float]
-    offset: float = 0.0
-    bends: Array = field(default_factory=lambda: np.zeros(0))
     drag: float = 0.0
-    wraps: tuple[Wrap, ...] = ()
 
 
 class Canals:
@@ -68,7 +59,7 @@ class Canals:
     def __init__(
         self,
         description: FingerDescription,
-        routes: TendonPaths,
+        paths: TendonPaths,
         tendons: Tendons,
         rows: Sequence[Rows],
         drive_matrices: Mapping[str, Array],
@@ -78,7 +69,7 @@ class Canals:
 
         Args:
             description: Of the finger.
-            routes: The tendons of its tree.
+            paths: The tendons of its tree.
             tendons: With the numbers of friction, those of canals after the finger's own.
             rows: Earlier rows: those of the tree, and of the finger's tendons.
             drive_matrices: Weights with which drives pull the actuated tendons, by table.
@@ -87,13 +78,13 @@ class Canals:
         self.tables: list[Rows] = []
         self.loads: dict[str, Array] = {}
         self.wraps: dict[str, Array] = {}
-        self._description, self._tree, self._tendons = description, description.tree, tendons
+        self._description, self._tree, self._tendons, self._paths = description, description.tree, tendons, paths
         self._joints, self._width = tuple(description.joints), width
         self._tables_by_group = {table.group: table for table in rows}
         # They load the pins by themselves.
         self._loading = {"driven_tendons", *drive_matrices}
         actuated = [
-            self._actuated(index, name, routes, drive_matrices) for index, name in enumerate(description.actuated_names)
+            self._actuated(index, name, drive_matrices) for index, name in enumerate(description.actuated_names)
         ]
         tension_terms = {each.name: {("driven_tendons", each.name): 1.0} for each in actuated}
         self._add_wraps(WRAPS, actuated, tension_terms, 2)
@@ -107,7 +98,7 @@ class Canals:
             self._tables_by_group[CORDS] = self._cords(cords)
             self.tables.append(self._tables_by_group[CORDS])
         own = len(tendons.routing.tendons)
-        trunks = [self._trunk(name, index, routes) for index, name in enumerate(rubbing, start=own)]
+        trunks = [self._trunk(name, index) for index, name in enumerate(rubbing, start=own)]
         tension_terms |= {each.name: {} for each in trunks}
         self._add_wraps(CANALS, trunks, tension_terms)
         branches = [
@@ -132,51 +123,35 @@ class Canals:
             tension_terms: By canal, rows that change its tension by their forces; those of wraps are added.
             first: Which wrap is the first, from 1.
         """
-        for level in range(first, 1 + max((len(each.wraps) for each in canals), default=0)):
+        wraps = {canal.name: canal.cord.wraps for canal in canals}
+        for level in range(first, 1 + max(map(len, wraps.values()), default=0)):
             wrap_group = f"{group}_{level}" if level > 1 else group
-            wrapped_canals = [
-                (each, self._canal_at_wrap(each, level, tension_terms[each.name]))
-                for each in canals
-                if len(each.wraps) >= level
+            rubbing = [canal for canal in canals if len(wraps[canal.name]) >= level]
+            at_wraps = [
+                canal._replace(
+                    name=canal.name if level == 1 else f"{canal.name}.{wraps[canal.name][level - 1].name}",
+                    cord=wraps[canal.name][level - 1],
+                    sources=canal.sources | tension_terms[canal.name],
+                )
+                for canal in rubbing
             ]
-            self._tables_by_group[wrap_group] = self._table(wrap_group, [wrapped for _, wrapped in wrapped_canals])
+            self._tables_by_group[wrap_group] = self._table(wrap_group, at_wraps)
             self.tables.append(self._tables_by_group[wrap_group])
-            self._record_joint_loads(wrap_group, [wrapped for _, wrapped in wrapped_canals], whole=level == 1)
-            for canal, wrapped in wrapped_canals:
-                tension_terms[canal.name][wrap_group, wrapped.name] = 1.0
+            self._record_joint_loads(wrap_group, at_wraps, whole=level == 1)
+            for canal, at_wrap in zip(rubbing, at_wraps, strict=True):
+                tension_terms[canal.name][wrap_group, at_wrap.name] = 1.0
 
-    def _canal_at_wrap(self, canal: _Canal, level: int, tension_terms: dict[tuple[str, str], float]) -> _Canal:
-        """Return a canal at one of its wraps, from 1."""
-        wrap = canal.wraps[level - 1]
-        beyond = canal.wraps[level].crossed if level < len(canal.wraps) else frozenset()
-        before_next, from_wrap_on = (
-            np.array([name in each for name in self._joints]) for each in (wrap.crossed - beyond, wrap.crossed)
-        )
-        coefficients = canal.route.coefficients * (from_wrap_on if level > 1 else 1.0)
-        return replace(
-            canal,
-            name=canal.name if level == 1 else f"{canal.name}.{wrap.name}",
-            route=canal.route.beyond(wrap, coefficients),
-            crossed=canal.crossed if level == 1 else wrap.crossed,
-            sources=canal.sources | tension_terms,
-            offset=wrap.offset,
-            bends=canal.bends * before_next if canal.bends.size else canal.bends,
-            drag=canal.drag * wrap.share,
-            wraps=(wrap,),
-        )
-
-    def _actuated(self, index: int, name: str, routes: TendonPaths, drive_matrices: Mapping[str, Array]) -> _Canal:
+    def _actuated(self, index: int, name: str, drive_matrices: Mapping[str, Array]) -> _Canal:
         """Return the canal of an actuated tendon, with all rows that pull it."""
         drives = {
             (group, self._tables_by_group[group].names[k]): float(weights[index, k])
             for group, weights in drive_matrices.items()
             for k in np.flatnonzero(weights[index])
         }
-        bends, wraps = self._tendons.routing.curvature_matrix[index], self._tendons.wraps[index]
-        return _Canal(name, index, routes.pulled[name], True, frozenset(), drives, bends=bends, wraps=wraps)
+        return _Canal(name, index, self._description.cord(name), True, drives)
 
-    def _trunk(self, name: str, index: int, routes: TendonPaths) -> _Canal:
-        """Return the canal of a tendon of the tree before its first pulley, at the first of its wraps.
+    def _trunk(self, name: str, index: int) -> _Canal:
+        """Return the canal of a tendon of the tree before its first pulley.
 
         Its index is that of its friction, after the finger's own tendons.
         """
@@ -198,25 +173,21 @@ class Canals:
                 one_way &= actuator.only_pulls
         if tree.linked(name):
             sources[CORDS, name] = 1.0
-        cord = self._description.cord(name)
-        turns = {element.name: element.turn for element in cord.elements}
-        bends = np.array([turns.get(joint, 0.0) for joint in self._joints])
-        crossed, wraps = cord.parts[0].crossed, self._tendons.wraps[index]
-        route = routes.routes[name]
-        return _Canal(name, index, route, one_way, crossed, sources, 0.0, bends, tendon.friction, wraps)
+        return _Canal(name, index, self._description.cord(name), one_way, sources, tendon.friction)
 
     def _branches_behind_pulley(self, trunk: _Canal, friction: dict[tuple[str, str], float]) -> list[_Canal]:
         """Return the branches of a tendon behind a pulley, pulled by the trunk's tension after friction, divided."""
-        parts = self._description.cord(trunk.name).parts[1:]
-        branches, behind = [], zip(trunk.route.branches, parts, strict=True)
-        for number, ((divisor, legs), part) in enumerate(behind, start=1):
-            if legs:
-                sources = {key: weight / divisor for key, weight in (trunk.sources | friction).items()}
-                route = TendonPath(np.zeros(len(self._joints)), legs)
-                wraps = find_wraps(self._description, trunk.name, number)
-                name = f"{trunk.name}.{number}"
-                branches.append(_Canal(name, trunk.tendon, route, trunk.one_way, part.crossed, sources, wraps=wraps))
-        return branches
+        return [
+            _Canal(
+                f"{trunk.name}.{number}",
+                trunk.tendon,
+                branch,
+                trunk.one_way,
+                {key: weight / branch.divisor for key, weight in (trunk.sources | friction).items()},
+            )
+            for number, branch in enumerate(trunk.cord.branches, start=1)
+            if branch.elements
+        ]
 
     def _cords(self, cords: Mapping[str, Mapping[str, float]]) -> Rows:
         """Return the tensions of cords that turn joints."""
@@ -236,14 +207,15 @@ class Canals:
 
     def _table(self, group: str, canals: Sequence[_Canal]) -> Rows:
         # Drawn in, a tendon gets shorter.
-        routes = [canal.route.times(-1.0) for canal in canals]
+        routes = [self._paths.along(canal.cord, -1.0) for canal in canals]
         arm, bends = np.zeros((2, len(canals), self._width))
-        for k, (canal, route) in enumerate(zip(canals, routes, strict=True)):
-            arm[k, : len(self._joints)] = route.coefficients
-            bends[k, : canal.bends.size] = canal.bends
-        numbers = self._tendons.at([canal.tendon for canal in canals], [canal.wraps[0] for canal in canals])
+        arm[:, : len(self._joints)] = [route.coefficients for route in routes]
+        bends[:, : len(self._joints)] = [canal.cord.turns(self._joints) for canal in canals]
+        numbers = self._tendons.at([canal.tendon for canal in canals], [canal.cord for canal in canals])
         # Drag is that of the whole tendon, before it is divided.
-        numbers[-1] = np.maximum(numbers[-1], [canal.drag for canal in canals]) * (not group.startswith(BRANCHES))
+        numbers[-1] = np.maximum(numbers[-1], [canal.drag * canal.cord.share for canal in canals]) * (
+            not group.startswith(BRANCHES)
+        )
         one_way = np.array([canal.one_way for canal in canals], dtype=float)
         return Rows(
             group=group,
@@ -253,7 +225,7 @@ class Canals:
             arm=arm,
             inputs=_input_weights([canal.sources for canal in canals], self._tables_by_group),
             bends=bends,
-            curvature_offset=np.array([canal.offset for canal in canals]),
+            curvature_offset=np.array([canal.cord.offset for canal in canals]),
             paths=tuple(route.legs for route in routes),
             stored=BRISTLES,
             powers=(*TENDON_LOSSES, SLACK),
@@ -267,7 +239,7 @@ class Canals:
             for canal in canals:
                 pressing = canal.sources if whole else {}
                 for (group, row), weight in (pressing | {(wrap_group, canal.name): 1.0}).items():
-                    if name in canal.crossed and group not in self._loading:
+                    if name in canal.cord.crossed and group not in self._loading:
                         press = self.loads.setdefault(
                             group, np.zeros((len(self._joints), self._tables_by_group[group].count))
                         )

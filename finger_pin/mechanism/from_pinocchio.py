@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -161,30 +160,6 @@ def turned_model(body: RigidBody, slides: bool = False) -> tuple[pin.Model, list
         model.inertias[at] = original.inertias[index]
         turns.append(turn)
     return model, turns
-
-
-def chain(model: pin.Model, first: int, count: int) -> pin.Model:
-    """Return a serial chain of joints of a tree as a separate model."""
-    branch = pin.Model()
-    for index in range(first, first + count):
-        branch.addJoint(index - first, model.joints[index], model.jointPlacements[index], model.names[index])
-    for before, after in pairwise(range(first, first + count)):
-        if int(model.parents[after]) != before:
-            raise InputError(f"joint {model.names[after]}", f"must be carried by {model.names[before]}")
-    return branch
-
-
-def finger_width(description: FingerDescription) -> float:
-    """Return the width of a finger, m, about, from the radii of its tendons."""
-    return _WIDTH * max(
-        abs(each.radius) for tendon in description.tendons.values() for each in tendon.crossings.values()
-    )
-
-
-def placed_solids(solids: pin.GeometryModel, turns: list[Array]) -> Iterator[tuple[pin.GeometryObject, pin.SE3]]:
-    """Yield the solids of a model with their placements in the frames that were turned."""
-    for solid in solids.geometryObjects:
-        yield solid, pin.SE3(turns[solid.parentJoint], np.zeros(3)).inverse() * solid.placement
 
 
 def _next_place(body: RigidBody, index: int) -> Array:

@@ -2,51 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from finger_pin.description.caching import cached_property
+from finger_pin.description.cords import Cord, CordElement
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.routing import Routing
-from finger_pin.description.waypoints import Waypoint
 from finger_pin.mechanism.body_places import Placed, rotation
-from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place, path_kinematics
+from finger_pin.mechanism.path_elements import PathElement, PathTerm, path_kinematics
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.spans import CYLINDER, SPHERE, STRAIGHT
 from finger_pin.mechanism.spans.span import COINCIDENT, SIDE_ON_OTHER_BODY
-from finger_pin.mechanism.tendon_wraps import Wrap
 from finger_pin.typing import Array
 
 
-@dataclass(frozen=True, eq=False)
-class TendonPath:
-    """The parts of a tendon's length; L = coefficients q + the lengths of its legs.
+class TendonPath(NamedTuple):
+    """What the rows of a tendon act along; its length is coefficients q + the lengths of the legs.
 
     Attributes:
         coefficients: Shape (n,).
         legs: Of its path.
-        branches: Behind each pulley, the divisor and the legs of that part, undivided.
     """
 
     coefficients: Array
-    legs: tuple[PathTerm, ...]
-    branches: tuple[tuple[float, tuple[PathTerm, ...]], ...] = ()
-
-    def beyond(self, wrap: Wrap, coefficients: Array) -> TendonPath:
-        """Return the path from a wrap to the end, with the given coefficients; only the wrap turns."""
-        legs = [replace(leg, bends=leg.bends and k < wrap.last) for k, leg in enumerate(self.legs) if k >= wrap.first]
-        # The leg before says which way it comes, if its ends lie apart.
-        last = max((k for k, leg in enumerate(self.legs[: wrap.first]) if leg.apart), default=0)
-        before = [replace(leg, arm=0.0, bends=False) for leg in self.legs[last : wrap.first]]
-        return TendonPath(coefficients, (*before, *legs))
-
-    def times(self, factor: float) -> TendonPath:
-        """Return the same with its length multiplied."""
-        legs = tuple(replace(leg, arm=factor * leg.arm) for leg in self.legs)
-        return TendonPath(factor * self.coefficients, legs)
+    legs: tuple[PathTerm, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,16 +39,16 @@ class TendonPaths:
 
     Attributes:
         body: The rigid body.
-        routes: Those of its tree, by name.
-        pulled: Those of the finger, by name: on joints, or along one of the tree's.
+        terms: Of every leg of a cord of the tree, how rows use its piece.
+        cords: Tendons of the tree, by name.
         placed: Places of the tree's bodies, by name.
         middles: Of the joints' ranges, by name, rad or m.
         references: Positions of the tree's joints at which its bodies are where their placements say, shape (n,).
     """
 
     body: RigidBody
-    routes: Mapping[str, TendonPath]
-    pulled: Mapping[str, TendonPath]
+    terms: Mapping[CordElement, PathTerm]
+    cords: Mapping[str, Cord]
     placed: Mapping[str | None, Placed]
     middles: Mapping[str, float]
     references: Array
@@ -77,30 +61,47 @@ class TendonPaths:
         tree, joints = description.tree, list(description.joints)
         references = np.array([tree.joints[name].reference if name in tree.joints else 0.0 for name in joints])
         placements = body.placements(references)[0] if tree.tendons else []
-        routes = {}
-        for name, tendon in tree.tendons.items():
-            coefficients = np.zeros(len(joints))
-            for joint, coefficient in (tendon.joints or {}).items():
-                coefficients[joints.index(joint)] = coefficient
-            routes[name] = _route(coefficients, tendon.path or {}, placed or {}, placements)
-        crossing = zip(description.tendons.items(), Routing.from_description(description).coupling, strict=True)
-        pulled = {
-            name: TendonPath(-arms, ()) if tendon.along is None else routes[tendon.along]
-            for (name, tendon), arms in crossing
-        }
+        cords, terms = {name: tree.cord(name) for name in tree.tendons}, {}
+        for leg in (each for cord in cords.values() for part in cord.parts for each in part.elements if each.points):
+            piece = _piece(leg, placed or {})
+            before, after = (placements[end.joint].act(end.point) for end in piece.ends[:2])
+            apart = float(np.linalg.norm(after - before)) > COINCIDENT
+            terms[leg] = PathTerm(piece, follows=leg.follows, apart=apart)
         middles = {name: 0.5 * sum(joint.range) for name, joint in description.joints.items()}
-        return cls(body, routes, pulled, placed or {}, middles, references)
+        return cls(body, terms, cords, placed or {}, middles, references)
+
+    def along(self, cord: Cord, factor: float = 1.0) -> TendonPath:
+        """Return what rows act along that pull a cord from the beginning of a piece to its end, pulleys included.
+
+        Its curvature is that of the piece, and its length is multiplied.
+        """
+        coefficients = -factor * cord._replace(last=None).arms(tuple(self.middles))
+        legs: list[PathTerm] = []
+        for k, element in enumerate(cord.elements):
+            if not element.points:
+                continue
+            term = self.terms[element]
+            if k >= cord.first:
+                legs.append(replace(term, arm=factor, bends=cord.last is None or k < cord.last))
+            else:
+                # The leg before says which way the cord comes, if its ends lie apart.
+                legs = [*(() if term.apart else legs), replace(term, arm=0.0, bends=False)]
+        behind = (
+            replace(self.terms[element], arm=factor * (1.0 / branch.divisor), bends=False)
+            for branch in cord.branches
+            for element in branch.elements
+        )
+        return TendonPath(coefficients, (*legs, *behind))
+
+    @cached_property
+    def routes(self) -> dict[str, TendonPath]:
+        """The tendons of the tree as what rows act along, by name."""
+        return {name: self.along(cord) for name, cord in self.cords.items()}
 
     @cached_property
     def reference_lengths(self) -> dict[str | None, float]:
         """Lengths of the tree's tendons with the joints at their references, m; what is drawn in counts from there."""
         return dict(zip(self.routes, self.length(self.references).tolist(), strict=True))
-
-    @property
-    def fixed(self) -> Array:
-        """The part of dL/dq that does not depend on the posture, shape (t, n)."""
-        rows = [route.coefficients for route in self.routes.values()]
-        return np.array(rows).reshape(-1, int(self.body.model.nv))
 
     def length(self, q: Array) -> Array:
         """Return the lengths at q, shape (..., n), as MuJoCo's ``ten_length``: shape (..., t), m."""
@@ -121,42 +122,15 @@ class TendonPaths:
             length, arms, turn = (np.array(part) for part in zip(*postures, strict=True))
             return length, arms, turn
         kinematics = path_kinematics(self.body, q, [route.legs for route in self.routes.values()], len(q))
-        return kinematics.length + self.fixed @ q, kinematics.arm + self.fixed, kinematics.turn
+        fixed = np.reshape([route.coefficients for route in self.routes.values()], (-1, len(q)))
+        return kinematics.length + fixed @ q, kinematics.arm + fixed, kinematics.turn
 
 
-def _route(
-    coefficients: Array,
-    path: Mapping[str, Waypoint],
-    placed: Mapping[str | None, Placed],
-    placements: Sequence[pin.SE3],
-) -> TendonPath:
-    """Return a tendon's path; the turn before the first pulley is that of its canal."""
-    parts: list[tuple[float, list[PathTerm]]] = [(1.0, [])]
-    before: Place | None = None
-    wrap: Waypoint | None = None
-    for waypoint in path.values():
-        if waypoint.kind == "pulley":
-            parts.append((waypoint.divisor, []))
-            before = None
-        elif waypoint.kind == "point":
-            point = placed[waypoint.body].place(waypoint.position)
-            if before is not None:
-                legs = parts[-1][1]
-                ends = [placements[end.joint].act(end.point) for end in (before, point)]
-                apart = float(np.linalg.norm(ends[1] - ends[0])) > COINCIDENT
-                legs.append(PathTerm(_piece(before, point, wrap, placed), follows=bool(legs), apart=apart))
-            before, wrap = point, None
-        else:
-            wrap = waypoint
-    (_, trunk), *branches = parts
-    behind = [replace(leg, arm=1.0 / divisor, bends=False) for divisor, legs in branches for leg in legs]
-    divided = tuple((divisor, tuple(legs)) for divisor, legs in branches)
-    return TendonPath(coefficients, (*trunk, *behind), divided)
-
-
-def _piece(first: Place, second: Place, wrap: Waypoint | None, placed: Mapping[str | None, Placed]) -> PathElement:
-    if wrap is None:
-        return PathElement(STRAIGHT, np.zeros(0), (first, second))
+def _piece(leg: CordElement, placed: Mapping[str | None, Placed]) -> PathElement:
+    ends = tuple(placed[point.body].place(point.position) for point in leg.points)
+    if leg.wrap is None:
+        return PathElement(STRAIGHT, np.zeros(0), ends)
+    _, wrap = leg.wrap
     body = placed[wrap.body]
     frame = body.frame * pin.SE3(rotation(wrap.orientation), np.array(wrap.position))
     side, elsewhere = (0.0, 0.0, 0.0) if wrap.side is None else wrap.side, wrap.side_point
@@ -165,7 +139,7 @@ def _piece(first: Place, second: Place, wrap: Waypoint | None, placed: Mapping[s
     numbers = np.array([wrap.radius, *side, has_side, inside], dtype=float)
     third = (placed[elsewhere.body].place(elsewhere.position),) if elsewhere else ()
     shape = CYLINDER if wrap.kind == "cylinder" else SPHERE
-    return PathElement(shape, numbers, (first, second, *third), body.joint, frame)
+    return PathElement(shape, numbers, (*ends, *third), body.joint, frame)
 
 
 class Excursions:
@@ -182,13 +156,13 @@ class Excursions:
         self._coupling, self._whole = routing.coupling, paths
         self._along = [tendon.along for tendon in description.tendons.values()]
         self._through_space = np.flatnonzero(routing.through_space)
-        routes = {routing.tendons[k]: paths.pulled[routing.tendons[k]] for k in self._through_space}
-        self._paths = replace(paths, routes=routes)
+        cords = {routing.tendons[k]: description.cord(routing.tendons[k]) for k in self._through_space}
+        self._paths = replace(paths, cords=cords)
 
     def lengths(self, position: Array) -> Array:
         """Return the excursions of the tendons at theta, shape (..., n): shape (..., t), m."""
         drawn = np.asarray(position @ self._coupling.T)
-        if self._whole.routes:
+        if self._whole.cords:
             if self._through_space.size:
                 drawn[..., self._through_space] = -self._paths.length(position)
             drawn += [self._whole.reference_lengths.get(name, 0.0) for name in self._along]

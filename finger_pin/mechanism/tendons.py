@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finger_pin.description.caching import cached_property
+from finger_pin.description.cords import Cord
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.friction import bristles
 from finger_pin.description.routing import Routing
@@ -18,7 +19,6 @@ from finger_pin.laws.spring import TENDON_HALF
 from finger_pin.mechanism.groups import SOURCES_WITH_END, TENDON_LOSSES, WINCHES
 from finger_pin.mechanism.joints import OF_TENDONS, hysteresis_rows
 from finger_pin.mechanism.rows import Energy, Rows
-from finger_pin.mechanism.tendon_wraps import Wrap, find_wraps
 from finger_pin.mechanism.wiring import drive_matrices
 from finger_pin.typing import Array, Number
 
@@ -39,26 +39,31 @@ class Tendons:
         description: The finger.
         routing: The routing matrices.
         wraps: The places where each of its tendons, and of those of its tree, rubs.
-        several: By index of tendons that rub at several places, for each its joints' mask in (15), its offset, rad, and
-            the mask of the joints from there on.
     """
 
     description: FingerDescription
     routing: Routing
-    wraps: tuple[tuple[Wrap, ...], ...]
-    several: Mapping[int, Sequence[tuple[Array, float, NDArray[np.bool_]]]]
+    wraps: tuple[tuple[Cord, ...], ...]
 
     @classmethod
     def from_description(cls, description: FingerDescription) -> Tendons:
         """Find the places where tendons rub."""
         routing = Routing.from_description(description)
-        wraps = [find_wraps(description, name) for name in (*routing.tendons, *description.canals)]
-        several = {
-            k: _places(routing, k, wraps[k])
-            for k, through_space in enumerate(routing.through_space)
-            if len(wraps[k]) > 1 and not through_space
+        wraps = (description.cord(name).wraps for name in (*routing.tendons, *description.canals))
+        return cls(description, routing, tuple(wraps))
+
+    @cached_property
+    def several(self) -> dict[int, list[tuple[Array, float, NDArray[np.bool_]]]]:
+        """By index of tendons that rub at several places, of each the turns (15) and offset, and which joints follow.
+
+        Turns have shape (n,), offsets are in rad; only tendons on joints are there, none along paths through space.
+        """
+        joints, through_space = self.routing.joints, self.routing.through_space
+        return {
+            k: [(wrap.turns(joints), wrap.offset, np.isin(joints, [*wrap.crossed])) for wrap in self.wraps[k]]
+            for k in range(len(through_space))
+            if len(self.wraps[k]) > 1 and not through_space[k]
         }
-        return cls(description, routing, tuple(wraps), several)
 
     def _number(self, entry: str) -> Array:
         return self.description.numbers["tendon_friction"][entry][: len(self.routing.tendons)]
@@ -223,16 +228,13 @@ class Tendons:
         actuated, passive = routing.actuated, routing.passive
         width = joints + passive + motors
         driven, bends = np.zeros((2, len(routing.tendons), width))
+        # `Canals` has the wraps beyond the first ones.
+        first = [places[0] for places in self.wraps[: len(routing.tendons)]]
         driven[:, :joints] = routing.coupling
         driven[actuated:] = np.eye(passive, width, joints)
-        bends[:, :joints] = routing.curvature_matrix
-        offset = routing.curvature_offset.copy()
-        for k, places in enumerate(self.wraps[: len(routing.tendons)]):
-            if len(places) > 1:
-                # `Canals` has the others.
-                bends[k, :joints], offset[k], _ = _places(routing, k, places)[0]
-        names, size = routing.passive_names, len(routing.tendons)
-        friction = self.at(range(size), [places[0] for places in self.wraps[:size]])
+        bends[:, :joints] = np.reshape([wrap.turns(routing.joints) for wrap in first], (-1, joints))
+        offset, names = np.array([wrap.offset for wrap in first]), routing.passive_names
+        friction = self.at(range(len(first)), first)
         wired = drive_matrices(drives, routing.tendons[:actuated])
         replaced = np.any(np.hstack([np.zeros((actuated, 0)), *wired.values()]), axis=1)
         halves = self._halves(motors)
@@ -269,16 +271,9 @@ class Tendons:
             ),
         ]
 
-    def at(self, tendons: Sequence[int], wraps: Sequence[Wrap]) -> Array:
+    def at(self, tendons: Sequence[int], wraps: Sequence[Cord]) -> Array:
         """Return the numbers of `friction` of some tendons at some of their places, shape (f, k)."""
         friction = self.friction[:, tendons]
         shared = [PASSIVE_FRICTION.parameters.index(name) for name in ("stiffness", "viscous", "drag")]
         friction[shared] *= [wrap.share for wrap in wraps]
         return friction
-
-
-def _places(routing: Routing, tendon: int, wraps: Sequence[Wrap]) -> list[tuple[Array, float, NDArray[np.bool_]]]:
-    beyond = [np.array([name in wrap.crossed for name in routing.joints]) for wrap in wraps]
-    ends = [*beyond[1:], np.zeros(len(routing.joints), dtype=bool)]
-    bends = routing.curvature_matrix[tendon]
-    return [(bends * (own & ~after), wrap.offset, own) for own, after, wrap in zip(beyond, ends, wraps, strict=True)]

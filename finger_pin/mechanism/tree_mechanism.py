@@ -31,7 +31,6 @@ from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Energy, Rows
 from finger_pin.mechanism.spans import ANGLE, RISE
 from finger_pin.mechanism.tendon_paths import TendonPath, TendonPaths
-from finger_pin.mechanism.tendon_wraps import find_wraps
 from finger_pin.mechanism.tendons import SOURCES
 from finger_pin.typing import Array
 
@@ -88,12 +87,11 @@ def along_paths(description: FingerDescription, paths: TendonPaths, table: Rows)
 
     The curvature of driven ones is that of the first place where they rub.
     """
-    if (table.group != "driven_tendons" and not table.pulls) or not paths.routes:
+    if (table.group != "driven_tendons" and not table.pulls) or not paths.cords:
         return table
     arm, offset, legs, joints = table.arm.copy(), table.offset.copy(), [], len(description.joints)
     for k, name in enumerate(table.pulls or table.names):
-        drawn = paths.pulled[name].times(-1.0)
-        drawn = drawn.beyond(find_wraps(description, name)[0], drawn.coefficients)
+        drawn = paths.along(description.cord(name).wraps[0], -1.0)
         arm[k, :joints] = drawn.coefficients
         legs.append(drawn.legs)
         offset[k] += paths.reference_lengths.get(description.tendons[name].along, 0.0)
@@ -103,7 +101,7 @@ def along_paths(description: FingerDescription, paths: TendonPaths, table: Rows)
 def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -> list[Rows]:
     """Return the rows of a tree, without the friction of loaded tendons, for a number of coordinates."""
     tree = description.tree
-    joints = {name: TendonPath(row, ()) for name, row in zip(tree.joints, np.eye(len(tree.joints)), strict=True)}
+    joints = dict(zip(tree.joints, np.eye(len(tree.joints)), strict=True))
 
     def table(
         group: str, law: Law, along: dict[str, TendonPath], numbers: Sequence[Sequence[float]], **further: Any
@@ -125,7 +123,7 @@ def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -
             tables.append(table(group, law, along, numbers))
     cords = {name: each for name, each in tree.tendons.items() if each.slack is not None}
     if cords:
-        along = {name: routes.routes[name].times(-1.0) for name in cords}
+        along = {name: routes.along(routes.cords[name], -1.0) for name in cords}
         offset = np.array([routes.reference_lengths[name] + (each.slack or 0.0) for name, each in cords.items()])
         numbers = [(each.stiffness, each.damping) for each in cords.values()]
         tables.append(table(ELASTIC, ELASTIC_TENDON, along, numbers, offset=offset, unit="m"))
@@ -133,7 +131,9 @@ def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -
     for group, law in ((STATELESS, ACTUATOR), (STATEFUL, ACTUATOR_WITH_STATE), (MUSCLES, MUSCLE)):
         actuators = {name: each for name, each in tree.actuators.items() if actuator_table(each) == group}
         along = {
-            name: (joints[each.joint] if each.joint else routes.routes[str(each.tendon)]).times(each.gear)
+            name: TendonPath(each.gear * joints[each.joint])
+            if each.joint
+            else routes.along(routes.cords[str(each.tendon)], each.gear)
             for name, each in actuators.items()
         }
         if actuators:
@@ -167,19 +167,18 @@ def _tendons(tree: Tree, routes: TendonPaths) -> list[_Described]:
     ]
 
 
-def _couplings(tree: Tree, routes: TendonPaths, joints: Mapping[str, TendonPath]) -> _Described:
+def _couplings(tree: Tree, routes: TendonPaths, joints: Mapping[str, Array]) -> _Described:
     """Return the springs that hold joints to others."""
     along = {name: coupling_route(tree, routes, each, joints) for name, each in tree.couplings.items()}
     numbers = [(each.stiffness, each.offset, each.damping) for each in tree.couplings.values()]
     return "coupling", JOINT_SPRING, along, numbers
 
 
-def coupling_route(tree: Tree, routes: TendonPaths, coupling: Coupling, joints: Mapping[str, TendonPath]) -> TendonPath:
+def coupling_route(tree: Tree, routes: TendonPaths, coupling: Coupling, joints: Mapping[str, Array]) -> TendonPath:
     """Return the constraint of a coupling, q - f(q_other), as a path."""
-    coefficients = joints[coupling.joint].coefficients
     if coupling.other is None:
-        return TendonPath(coefficients, ())
-    route = TendonPath(coefficients - coupling.slope * joints[coupling.other].coefficients, ())
+        return TendonPath(joints[coupling.joint])
+    route = TendonPath(joints[coupling.joint] - coupling.slope * joints[coupling.other])
     if not any(coupling.higher):
         return route
     # An angle is measured from its range's middle, so that it never comes to half a turn.
@@ -197,7 +196,7 @@ def coupling_route(tree: Tree, routes: TendonPaths, coupling: Coupling, joints: 
     else:
         still = Place(parent, np.array(frame.act(np.array([0.0, 0.0, middle]))))
         piece = PathElement(RISE, numbers, (still, Place(index, np.zeros(3))), parent, frame)
-    return replace(route, legs=(PathTerm(piece, arm=-1.0),))
+    return route._replace(legs=(PathTerm(piece, arm=-1.0),))
 
 
 def _loops(tree: Tree, routes: TendonPaths) -> _Described:

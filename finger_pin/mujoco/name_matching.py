@@ -68,14 +68,13 @@ def friction_keys(description: FingerDescription) -> tuple[dict[str, dict[str, A
     tendons = {}
     for index, (name, written) in enumerate(written_names.items()):
         cord = description.cord(name)
-        keys = _values_at(tendon_settings, index, len(written_names)) | {"curvature_offset": cord.curvature_offset}
+        keys = _values_at(tendon_settings, index, len(written_names)) | {"curvature_offset": cord.offset}
         if not cord.through_space:
             turns = {element.name: element.turn for element in cord.elements if element.turn}
             if set(turns.values()) - {1.0}:
                 allowed = "must be 1 rad per rad in MuJoCo; or leave out friction"
                 raise InputError(f"finger.tendons.{name}: turn over its joints", allowed, turns)
             keys |= {"bends": tuple(turns)}
-            keys["curvature_offset"] += sum(element.curvature_offset for element in cord.elements)
         loss = description.tree.tendons[written].friction if written in description.tree.tendons else 0.0
         tendons[written] = keys | {"drag": max(keys["drag"] - loss, 0.0)}
     bearings = dict(zip(description.joints, description.bearings, strict=True))

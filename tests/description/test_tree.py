@@ -56,6 +56,36 @@ def test_the_tree_itself_is_taken():
     assert fp.Finger(changed()).mechanism.channels == 2
 
 
+def test_a_cord_has_a_leg_from_point_to_point_of_its_path_with_what_it_may_wrap_between():
+    """The hinge moves one end of each; the tip is fixed to the link, and the wrap to the base."""
+    places = {"a": None, "b": "link", "over": None, "c": "tip", "pulley": None, "d": None, "e": "link"}
+    kinds = {"over": {"kind": "cylinder", "radius": 0.003}, "pulley": {"kind": "pulley", "divisor": 2.0}}
+    ends = {name: {"kind": "point", "position": [0.01 * k, 0.02, 0.0]} for k, name in enumerate(places)} | kinds
+    path = {name: ends[name] | ({"body": body} if body else {}) for name, body in places.items()}
+    tree = changed(tree__tendons__upper__path=path).tree
+    points, found = tree.tendons["upper"].path, tree.cord("upper").parts
+    expected = [("1", "ab", None, False), ("2", "bc", "over", True)], [("1", "de", None, False)]
+    for part, legs in zip(found, expected, strict=True):
+        assert all(leg.crossed == {"hinge"} for leg in part.elements)
+        assert [(leg.name, leg.points, leg.wrap, leg.follows) for leg in part.elements] == [
+            (name, tuple(points[end] for end in pair), wrap and (wrap, points[wrap]), follows)
+            for name, pair, wrap, follows in legs
+        ]
+    assert [part.divisor for part in found] == [1.0, 2.0]
+
+
+def test_past_a_bend_a_cord_slides_by_its_legs_from_there_on_alone():
+    """Coefficients of joints stand before its path, although it crosses the same joint again behind the bend."""
+    points = {"a": None, "b": "link", "c": None}
+    path = {name: {"kind": "point", "position": [0.0, 0.02, 0.01 * k]} for k, name in enumerate(points)}
+    path["b"]["body"] = "link"
+    given = {"joints": {"hinge": 0.01}, "path": path}
+    finger = fp.Finger(changed(tree__tendons__upper=given, tendon_friction={"place": "bends"}))
+    entry, bend = (table for table in finger.mechanism.rows if table.names in (("pull",), ("pull.2",)) and table.routed)
+    assert (entry.arm.item(), bend.arm.item()) == (-0.01, 0.0)
+    assert [leg.arm for leg in entry.paths[0]] == [-1.0, -1.0] and [leg.arm for leg in bend.paths[0]] == [0.0, -1.0]
+
+
 def test_directions_that_are_rounded_have_length_1():
     turned = changed(
         tree__bodies__link__orientation=[0.0, 0.7071, 0.0, 0.7071], tree__joints__hinge__axis=[0.6, 0.8001, 0.0]

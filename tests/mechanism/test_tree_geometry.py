@@ -152,13 +152,13 @@ def test_sums_of_hinges_wind_around_them_and_are_drawn_longer_by_their_excursion
         error = np.abs(arm).sum() * 4.0 * np.pi / (24.0 * resolution**2)
         np.testing.assert_allclose(lengths[name] - lengths[name][0], positions @ arm, atol=error)
         assert error < 1e-3 * np.ptp(positions @ arm)
-    for pulley in geometry.pulleys:
-        rotation, place = poses.rotation[:, pulley.joint, None], poses.translation[:, pulley.joint, None]
-        local = np.einsum("mpji,mpj->mpi", rotation, drawn[pulley.tendon] - place) @ pulley.frame
+    for tendon, arc in geometry.arcs:
+        rotation, place = poses.rotation[:, arc.joint, None], poses.translation[:, arc.joint, None]
+        local = np.einsum("mpji,mpj->mpi", rotation, drawn[tendon] - place) @ arc.frame
         distance = np.linalg.norm(local[..., :2], axis=-1)
-        on_pulley = np.isclose(distance, abs(pulley.radius), atol=1e-12) & (np.abs(local[..., 2]) < 0.01)
+        on_pulley = np.isclose(distance, abs(arc.radius), atol=1e-12) & (np.abs(local[..., 2]) < 0.01)
         assert np.all(np.count_nonzero(on_pulley, axis=1) > 3)
-    assert len(geometry.pulleys) == 6
+    assert len(geometry.arcs) == 6
 
 
 @pytest.mark.slow

@@ -40,7 +40,7 @@ def states(finger, count=20, seed=3):
 def test_the_pin_of_a_swinging_pendulum_bears_weight_centripetal_force_and_tendons():
     """By hand: m (a - g) + sum f along x - F, with a of the mass centre; and the moment balance of the link."""
     finger = pendulum()
-    lanes = np.array([pulley.offset for pulley in TendonGeometry(finger.description).pulleys])
+    lanes = np.array([arc.lane for _, arc in TendonGeometry(finger.description).arcs])
     assert np.ptp(lanes) > 1e-3
     position, velocity, acceleration, strands = states(finger)
     found = pin_wrench(finger, position, velocity, acceleration, strands, FORCE)

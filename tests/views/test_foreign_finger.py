@@ -10,6 +10,7 @@ from unpacked_page import unpacked
 import finger_pin as fp
 from finger_pin.analysis import force_polytope, self_locking_map
 from finger_pin.description.finger_description import HandSettings
+from finger_pin.description.validation import validate
 from finger_pin.mechanism.geometry import TendonGeometry
 from finger_pin.views import plots, view_forces
 from finger_pin.views.viewer import write_animation
@@ -128,6 +129,26 @@ def test_tendons_on_a_model_change_their_length_by_radius_times_angle(whole):
     actuated = whole.routing.actuated
     expected = -0.1 * whole.coupling.sum(axis=1)
     np.testing.assert_allclose(changed[:actuated], expected[:actuated], atol=2e-6)
+
+
+def test_a_tendon_over_two_chains_of_a_model_is_drawn_on_each_and_changes_by_radius_times_angle():
+    """(3): the pieces on both together; c is not carried by b, which comes before it."""
+    model, inertia = pin.Model(), pin.Inertia(0.1, np.array([0.02, 0.0, 0.0]), 1e-5 * np.eye(3))
+    for name, parent, place in (("a", 0, [0.0, 0.0, 0.0]), ("b", 1, [0.05, 0.0, 0.0]), ("c", 0, [0.0, 0.1, 0.0])):
+        joint = model.addJoint(parent, pin.JointModelRZ(), pin.SE3(np.eye(3), np.array(place)), name)
+        model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+    model.addFrame(pin.Frame("tip", 2, pin.SE3(np.eye(3), np.array([0.04, 0.0, 0.0])), pin.FrameType.OP_FRAME))
+    crossings = {"a": {"radius": 0.01}, "b": {"radius": 0.008}, "c": {"radius": -0.006}}
+    joints = {name: {"range": [-0.5, 0.9]} for name in crossings}
+    finger = {"name": "forked", "joints": joints, "tendons": {"T": {"crossings": crossings}}}
+    described = validate(fp.FingerDescription, finger, ("finger",))
+    whole = fp.Finger.from_model(described, model, {name: name for name in crossings}, "tip")
+    geometry = TendonGeometry(described, resolution=60, body=whole.rigid_body)
+    paths = geometry.paths(np.array([[0.2, 0.3, 0.1], [0.3, 0.35, 0.03]]))
+    assert [path.name for path in paths] == ["T", "T.1"]
+    lengths = [np.linalg.norm(np.diff(path.points, axis=1), axis=2).sum(axis=1) for path in paths]
+    expected = -(0.01 * 0.1 + 0.008 * 0.05), -0.006 * 0.07
+    np.testing.assert_allclose(np.diff(lengths, axis=1)[:, 0], expected, atol=2e-6)
 
 
 def test_links_and_tips_of_a_model_are_where_pinocchio_has_them(robot, whole):

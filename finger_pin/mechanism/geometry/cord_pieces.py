@@ -63,12 +63,6 @@ class WoundSpan:
         sag = (DRAWN_SAG * loose * self.sag)[..., None] * down
         return np.asarray(self.points @ np.swapaxes(rotation, -1, -2) + translation + sag)
 
-    def moved(self, place: pin.SE3, first: int) -> WoundSpan:
-        """Return the piece as part of a hand: at its finger's place, after the joints of other fingers."""
-        if self.link:
-            return replace(self, link=first + self.link)
-        return replace(self, points=self.points @ place.rotation.T + place.translation)
-
     def turned(self, turns: Sequence[Array]) -> WoundSpan:
         """Return the piece with the frames of its links turned, each by a rotation."""
         return replace(self, points=self.points @ turns[self.link].T)
@@ -76,14 +70,15 @@ class WoundSpan:
 
 @dataclass(frozen=True, eq=False)
 class Arc:
-    """A piece around a joint.
+    """A piece around a joint, on a pulley as wide as a lane.
 
     Attributes:
         joint: Index of the joint, 1 for the first.
         radius: r, m.
         entry: Direction of the path where it meets the pulley, in the frame of the link before the joint, rad.
         turn: Turn of the path from entry to exit at theta = 0, rad.
-        offset: Of each point along the joint axis, shape (P,), m.
+        lane: Offset of its pulley along the joint axis, m.
+        skew: How far its ends lie beside that, each on its side, m.
         fraction: Of each point along the arc, 0 to 1, shape (P,).
         distal: As for `WoundSpan`.
         frame: Rotation of the pulley, whose axis is z, in the frame of the link after the joint, shape (3, 3).
@@ -93,10 +88,16 @@ class Arc:
     radius: float
     entry: float
     turn: float
-    offset: Array
+    lane: float
+    skew: float
     fraction: Array
     distal: NDArray[np.bool_]
     frame: Array = field(default_factory=lambda: np.eye(3))
+
+    @property
+    def offset(self) -> Array:
+        """Of each point along the joint axis, shape (P,), m."""
+        return self.lane + self.skew * (2.0 * self.fraction - 1.0)
 
     def place(self, position: Array, loose: Array, poses: LinkPoses, down: Array) -> Array:
         """Return its points in space; see `WoundSpan.place`."""
@@ -107,10 +108,6 @@ class Arc:
         offset = np.broadcast_to(self.offset, direction.shape)
         local = np.stack([-radius * np.sin(direction), radius * np.cos(direction), offset], axis=-1)
         return np.asarray(local @ np.swapaxes(rotation @ self.frame, -1, -2) + translation)
-
-    def moved(self, place: pin.SE3, first: int) -> Arc:
-        """Return the piece as part of a hand, after the joints of other fingers."""
-        return replace(self, joint=first + self.joint)
 
     def turned(self, turns: Sequence[Array]) -> Arc:
         """Return the piece with the frames of its links turned, each by a rotation."""

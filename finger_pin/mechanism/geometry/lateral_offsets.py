@@ -31,7 +31,9 @@ class Lanes:
     lead: float
 
 
-def tendon_lanes(arms: Mapping[str, Mapping[int, float]], model: pin.Model, widths: Sequence[float]) -> Lanes:
+def tendon_lanes(
+    arms: Mapping[str, Mapping[int, float]], model: pin.Model, widths: Sequence[float], joints: Sequence[int]
+) -> Lanes:
     """Give every tendon a lane at every joint.
 
     Joints with parallel axes share their lanes. A tendon whose winding at the other joints puts it to one side gets
@@ -40,12 +42,13 @@ def tendon_lanes(arms: Mapping[str, Mapping[int, float]], model: pin.Model, widt
 
     Args:
         arms: Of the tendons, m: by name and index of the joints that they cross.
-        model: Pinocchio model of the finger, whose joints turn about z.
-        widths: Of its links, m.
+        model: Pinocchio model whose joints turn about z.
+        widths: Of the finger's links, m.
+        joints: Indices of its joints, 1 for the model's first.
     """
     data = model.createData()
     pin.forwardKinematics(model, data, np.zeros(model.nq))
-    frames: dict[int, Array] = {joint: np.array(data.oMi[joint].rotation) for joint in range(1, model.njoints)}
+    frames: dict[int, Array] = {joint: np.array(data.oMi[joint].rotation) for joint in joints}
     width = min(widths)
     families = _families(frames)
     offset: dict[tuple[str, int], float] = {}

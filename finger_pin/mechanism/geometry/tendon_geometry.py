@@ -12,10 +12,10 @@ from finger_pin.description.finger_description import FingerDescription
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.bodies import place_bodies
 from finger_pin.mechanism.from_pinocchio import turned_model
-from finger_pin.mechanism.geometry.cord_pieces import LinkPoses, Piece, link_poses
-from finger_pin.mechanism.geometry.fingers import fingers_of_links, fingers_on_model
+from finger_pin.mechanism.geometry.cord_pieces import Arc, LinkPoses, Piece, link_poses
+from finger_pin.mechanism.geometry.fingers import wound_fingers
 from finger_pin.mechanism.geometry.tree_geometry import finger_of_tree
-from finger_pin.mechanism.geometry.visuals import body_visuals
+from finger_pin.mechanism.geometry.visuals import body_visuals, model_visuals
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.typing import Array
 
@@ -42,8 +42,7 @@ class TendonGeometry:
         description: Description that it was built from.
         model: Pinocchio model; the axis of every joint is the z axis of its frame, but in a tree.
         pieces: Pieces of every tendon, from the actuator on, by name; see `finger_of_tree` for those of a tree.
-        lanes: Offset of each tendon along the joint axes.
-        pulleys: Winding surfaces whose radius is not zero.
+        lanes: Sideways places of the tendons of the finger that reaches farthest, and the least spacing of all.
         visuals: The solids.
         tips: The fingertips: index of the link, and place in its frame, shape (3,), m.
         size: Largest distance of the fingertips from the base, about, m.
@@ -69,33 +68,35 @@ class TendonGeometry:
         """
         self.description, self.first_seen = description, 0 if description.links else 1
         if body is not None and description.links:
-            self.model, fingers, self.visuals = fingers_on_model(description, body, solids, resolution)
+            self.model, turns = turned_model(body)
+            self.visuals = model_visuals(solids, turns)
         else:
             body, placed = place_bodies(description)
-            if description.links:
-                fingers = fingers_of_links(description, resolution)
-            else:
-                fingers = [finger_of_tree(description, resolution)]
-            self.model, self.visuals = body.model, body_visuals(description.bodies, placed)
-        rotations = [np.eye(3)] * self.model.njoints if body.model is self.model else turned_model(body)[1]
+            self.model, turns = body.model, [np.eye(3)] * body.model.njoints
+            self.visuals = body_visuals(description.bodies, placed)
+        if description.links:
+            fingers = wound_fingers(description, self.model, resolution)
+        else:
+            fingers = [finger_of_tree(description, resolution)]
         frames = [body.model.frames[tip] for tip in body.tips]
-        self.tips = tuple((int(f.parentJoint), rotations[f.parentJoint].T @ f.placement.translation) for f in frames)
+        self.tips = tuple((int(f.parentJoint), turns[f.parentJoint].T @ f.placement.translation) for f in frames)
         pieces: dict[str, tuple[Piece, ...]] = {}
         for finger in fingers:
-            pieces |= {**finger.legs, **finger.pieces}
+            pieces |= finger.pieces
         self.pieces = {name: pieces.pop(name) for name in description.tendons if name in pieces} | pieces
-        self.pulleys = tuple(pulley for finger in fingers for pulley in finger.pulleys)
         self.widths = tuple(width for finger in fingers for width in finger.widths)
         travel = 0.0
         if description.hand is not None:
             travel = sum(description.hand.palm.on_path(axis).greatest for axis in ("x", "y", "z"))
         self.size = max(finger.size for finger in fingers) + travel
         # Joints are looked at along the axes of the finger that reaches farthest.
-        self.lanes = replace(
-            max(fingers, key=lambda finger: finger.size).lanes,
-            offset={key: at for finger in fingers for key, at in finger.lanes.offset.items()},
-            spacing=min(finger.lanes.spacing for finger in fingers),
-        )
+        farthest = max(fingers, key=lambda finger: finger.size)
+        self.lanes = replace(farthest.lanes, spacing=min(finger.lanes.spacing for finger in fingers))
+
+    @property
+    def arcs(self) -> tuple[tuple[str, Arc], ...]:
+        """Pieces around joints, each with the name of its tendon."""
+        return tuple((name, each) for name, pieces in self.pieces.items() for each in pieces if isinstance(each, Arc))
 
     def poses(self, joint_position: ArrayLike, base: LinkPoses | None = None) -> LinkPoses:
         """Return the poses of the links at theta, shape (..., n), rad.

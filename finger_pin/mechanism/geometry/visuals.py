@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +15,7 @@ from finger_pin.description.meshes import Mesh
 from finger_pin.description.tree import Tree
 from finger_pin.description.tree_parts import MATERIALS, TreeSolid
 from finger_pin.mechanism.body_places import Placed, rotation
+from finger_pin.typing import Array
 
 _COAL = {"box": coal.Box, "sphere": coal.Sphere, "cylinder": coal.Cylinder, "ellipsoid": coal.Ellipsoid}
 
@@ -85,7 +86,11 @@ def _visuals(
     ]
 
 
-def model_visual(solid: pin.GeometryObject, placement: pin.SE3) -> Visual:
-    """Return a solid of a model of the user's own, with its placement."""
-    red, green, blue, opacity = (float(part) for part in solid.meshColor)
-    return Visual(solid.name, int(solid.parentJoint), solid.geometry, placement, (red, green, blue, opacity))
+def model_visuals(solids: pin.GeometryModel | None, turns: Sequence[Array]) -> tuple[Visual, ...]:
+    """Return the solids of a model of the user's own, whose frames were turned, each by a rotation."""
+    visuals = []
+    for solid in [] if solids is None else solids.geometryObjects:
+        joint, (red, green, blue, opacity) = int(solid.parentJoint), map(float, solid.meshColor)
+        placement = pin.SE3(turns[joint], np.zeros(3)).inverse() * solid.placement
+        visuals.append(Visual(solid.name, joint, solid.geometry, placement, (red, green, blue, opacity)))
+    return tuple(visuals)

@@ -100,8 +100,8 @@ def wind(
         if radius[j]:
             turn = leave[j] - entry[j] - side[j] * 2.0 * math.pi * turns[j]
             fraction = _arc_fractions(turn, ranges[j], resolution, last=after is None)
-            offsets = offset + skew[j] * (2.0 * fraction - 1.0)
-            pieces.append(Arc(j, radius[j], entry[j], turn, offsets, fraction, np.full(len(fraction), j > mass_link)))
+            distal = np.full(len(fraction), j > mass_link)
+            pieces.append(Arc(j, radius[j], entry[j], turn, offset, skew[j], fraction, distal))
         if after is not None:
             leaving = _on_pulley(radius[j], offset + skew[j], leave[j])
             arriving = _on_pulley(radius[after], lanes.offset[tendon, after] - skew[after], entry[after])

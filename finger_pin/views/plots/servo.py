@@ -71,8 +71,8 @@ def plot_servo(result: xr.Dataset, *, width: Width = None, titles: bool = True) 
 
 def _driven_joints(finger: FingerDescription, tendons: Iterable[str]) -> set[str]:
     """Return the joints that tendons turn."""
-    elements = [part for name in tendons for part in finger.cord(name).parts]
-    return {joint for part in elements for element in part.elements if element.moves for joint in element.crossed}
+    parts = [part for name in tendons for part in finger.cord(name).parts]
+    return {joint for part in parts for element in part.elements if element.moves for joint in element.crossed}
 
 
 def _draw_loop(axes: Axes, result: xr.Dataset, motor: str, finger: FingerDescription, driven: set[str]) -> None:

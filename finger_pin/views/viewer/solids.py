@@ -116,10 +116,10 @@ def link_solids(geometry: TendonGeometry, tube_radius: float) -> Iterator[Solid]
         opacity = float(visual.colour[3] * SOLID_OPACITY)
         pose = placement.rotation, placement.translation
         yield Solid(links[visual.link], visual.name, kind, sizes, *pose, colour, opacity, *mesh)
-    for pulley in geometry.pulleys:
-        sizes = (max(abs(pulley.radius) - tube_radius, 0.5 * tube_radius), 0.8 * geometry.lanes.spacing)
-        pose, name = (pulley.frame, pulley.offset * pulley.frame[:, 2]), f"groove_{pulley.tendon}"
-        yield Solid(links[pulley.joint], name, "cylinder", sizes, *pose, _GROOVE_COLOUR, SOLID_OPACITY)
+    for tendon, arc in geometry.arcs:
+        sizes = (max(abs(arc.radius) - tube_radius, 0.5 * tube_radius), 0.8 * geometry.lanes.spacing)
+        pose, name = (arc.frame, arc.lane * arc.frame[:, 2]), f"groove_{tendon}"
+        yield Solid(links[arc.joint], name, "cylinder", sizes, *pose, _GROOVE_COLOUR, SOLID_OPACITY)
 
 
 def root_command(rotation: Array) -> Command:
