@@ -160,10 +160,10 @@ def _meeting(integration: Integration, model: Model, e: int, one: Vector, two: V
 
 
 @njit_inline
-def _scan(integration: Integration, model: Model, e: int, contact_known: bool) -> float:
-    """Return the share of the step to a meeting of bodies that part again before its end, or `NOTHING_MISSED`.
+def _scan(integration: Integration, model: Model, e: int) -> tuple[float, float]:
+    """Return shares of the step to a meeting of bodies that part again before its end, and to any; `NOTHING_MISSED`.
 
-    Those that are not apart at its end have parted too, unless ``contact_known``: the step knows of it.
+    Those that are not apart at its end are another meeting where the step does not know of their contact.
     """
     structure, parameters, pieces = model.structure, model.parameters, model.work.paths
     looks = pieces.looks
@@ -179,14 +179,14 @@ def _scan(integration: Integration, model: Model, e: int, contact_known: bool) -
             continue
         if two[LOOK.gap] >= 0.0:
             if met < NOTHING_MISSED:
-                return met
+                return met, met
             parted = True
         elif parted and met == NOTHING_MISSED:
             met = _meeting(integration, model, e, one, two)
         for i in range(looks.shape[1]):
             one[i] = two[i]
         depth -= 1
-    return NOTHING_MISSED if contact_known else met
+    return NOTHING_MISSED, met
 
 
 @njit_always_inline
@@ -218,7 +218,7 @@ def detect_missed_contacts(integration: Integration, model: Model) -> float:
             pieces.ahead[e] = pieces.clear[e] - path
             if pieces.ahead[e] > 0.0:
                 continue
-            share = _scan(integration, model, e, True)
+            share = _scan(integration, model, e)[0]
             if share < NOTHING_MISSED or pieces.ahead[e] < 0.0:
                 # Until it is listed again it exerts nothing, whatever else the step has met.
                 set_culled(structure, k, 0, pieces.culled)
@@ -231,7 +231,8 @@ def detect_missed_contacts(integration: Integration, model: Model) -> float:
             if max(start, end) < 0.0 and rows[ROW.side, k] > 0.0:
                 continue
             ahead = pieces.ahead[e]
-            share = _scan(integration, model, e, _is_pressed(structure, rows, k))
+            parting, meeting = _scan(integration, model, e)
+            share = parting if _is_pressed(structure, rows, k) else meeting
             pieces.ahead[e] = ahead
         first = min(first, share)
     for j in range(size):

@@ -5,23 +5,20 @@ from __future__ import annotations
 from finger_pin.core.addresses.spatial import add_force_cross, apply_inertia, dot, motion_cross, sine_cosine
 from finger_pin.core.addresses.time_functions import SignalTable, signal_derivative
 from finger_pin.core.evaluation.rigid_body_dynamics import inverse_dynamics
-from finger_pin.core.jit import CompiledFunction, inlined, njit_inline, unpack
+from finger_pin.core.jit import CompiledFunction, inlined, njit_inline, scratch, types, unpack, view
 from finger_pin.core.tables.model import MODEL
 from finger_pin.laws import input_functions as palm_laws
 
-_base_motion = inlined(palm_laws.base_motion)
+_base_motion, _numbers_at = inlined(palm_laws.base_motion), view(types.float64)
 
 
 @njit_inline
 def _coordinates(signal: SignalTable, time: float, order: int) -> tuple[float, float, float, float, float, float]:
-    return (
-        signal_derivative(signal, 0, time, order),
-        signal_derivative(signal, 1, time, order),
-        signal_derivative(signal, 2, time, order),
-        signal_derivative(signal, 3, time, order),
-        signal_derivative(signal, 4, time, order),
-        signal_derivative(signal, 5, time, order),
-    )
+    # Called with a literal index each, the function would be compiled once for every one.
+    values = _numbers_at(scratch(6))
+    for j in range(6):
+        values[j] = signal_derivative(signal, j, time, order)
+    return values[0], values[1], values[2], values[3], values[4], values[5]
 
 
 @CompiledFunction
