@@ -27,6 +27,15 @@ from finger_pin.description.validation import (
 )
 from finger_pin.description.winding import check_supplies, check_winding
 
+# Entries of the controller and of its tables that may be lists, and what these are of.
+_LISTS = (
+    ("", "joint", ("gain", "damping")),
+    ("", "tendon", ("minimum_tension",)),
+    ("", "passive tendon", ("passive_tension",)),
+    ("tendon_friction_feedforward", "tendon", ("coulomb", "stiction_ratio")),
+    ("joint_friction_compensation", "joint", ("coulomb", "stiction", "viscous")),
+    ("distribution", "tendon", ("maximum_tension",)),
+)
 Share = Annotated[float, real(0.0, 2.0)]
 
 
@@ -200,34 +209,16 @@ def check_controller(settings: ControllerSettings, finger: FingerDescription) ->
         finger, settings.spool_angle or (), settings.tendon_winding or (), settings.motor_voltage or {}, settings.kind
     )
     check_supplies(finger, settings.supply_voltage or {}, settings.motor_voltage or ())
-    joints, tendons = tuple(finger.joints), tuple(finger.tendons)
-    of_joints, of_tendons = (joints, "joint"), (tendons, "tendon")
-    sizes: list[tuple[str, Numbers | None, tuple[tuple[str, ...], str]]] = [
-        ("gain", settings.gain, of_joints),
-        ("damping", settings.damping, of_joints),
-        ("minimum_tension", settings.minimum_tension, of_tendons),
-        ("passive_tension", settings.passive_tension, (finger.passive_names, "passive tendon")),
-    ]
-    tendon, joint = settings.tendon_friction_feedforward, settings.joint_friction_compensation
-    if tendon is not None:
-        for name in ("coulomb", "stiction_ratio"):
-            sizes.append((f"tendon_friction_feedforward.{name}", getattr(tendon, name), of_tendons))
-    if joint is not None:
-        for name in ("coulomb", "stiction", "viscous"):
-            sizes.append((f"joint_friction_compensation.{name}", getattr(joint, name), of_joints))
+    tendons = tuple(finger.tendons)
+    items = {"joint": tuple(finger.joints), "tendon": tendons, "passive tendon": finger.passive_names}
+    for table, kind, entries in _LISTS:
+        owner = getattr(settings, table) if table else settings
+        for entry in entries if owner else ():
+            check_size(getattr(owner, entry), items[kind], ".".join(filter(None, ("controller", table, entry))), kind)
     limits = settings.distribution
     if limits is not None:
-        sizes.append(("distribution.maximum_tension", limits.maximum_tension, of_tendons))
-    for entry, value, (names, kind) in sizes:
-        if value is not None:
-            check_size(value, names, f"controller.{entry}", kind)
-    if limits is not None:
-        for name, low, high in zip(
-            tendons,
-            expand(settings.minimum_tension, len(tendons)),
-            expand(limits.maximum_tension, len(tendons)),
-            strict=True,
-        ):
+        least, most = (expand(each, len(tendons)) for each in (settings.minimum_tension, limits.maximum_tension))
+        for name, low, high in zip(tendons, least, most, strict=True):
             if high < low:
                 allowed = f"must be at least the minimum tension, {low:g} N for {name}"
                 raise problem("controller.distribution.maximum_tension", allowed, limits.maximum_tension)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from finger_pin.description.caching import memoised
 from finger_pin.description.routing import Routing
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
@@ -29,6 +30,9 @@ class PassiveCoupling:
     followers: tuple[int, ...]
 
     @classmethod
+    @memoised(
+        lambda _, routing, tension, stiffness, needed=True: (routing, tension.tobytes(), stiffness.tobytes(), needed)
+    )
     def from_routing(
         cls, routing: Routing, tension: Array, stiffness: Array, *, needed: bool = True
     ) -> PassiveCoupling:

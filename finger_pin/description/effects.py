@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
+from finger_pin.description.fields import without
 from finger_pin.description.friction import WITHOUT_STRIBECK
 from finger_pin.description.validation import Description, problem
 
@@ -21,22 +22,36 @@ class Rule(NamedTuple):
         entries: Entries of that table; none for all of them.
         acts: Whether they act, by description and table.
         says: What is said when they do not.
+        refused: Choices in the table, and values of them, with which they do not act.
     """
 
     table: str
     entries: tuple[str, ...]
     acts: Callable[[Any, Any], object]
     says: str
+    refused: tuple[tuple[str, str], ...] = ()
+
+
+def _with(table: str, entries: tuple[str, ...], choice: str, *values: str) -> Rule:
+    """Return the rule of entries that act with some values of a choice in their table."""
+    named, own = " or ".join(f'"{value}"' for value in values), choice.rpartition(".")[2]
+    return Rule(table, entries, lambda _, each: getattr(each, own) in values, f"is for {choice} = {named}")
+
+
+def _without(table: str, entries: tuple[str, ...], choice: str, *values: str, says: str = "") -> Rule:
+    """Return the rule of entries that act with all values of a choice in their table but some."""
+    named, own = " or ".join(f'"{value}"' for value in values), choice.rpartition(".")[2]
+    says, refused = says or f"has no effect with {choice} = {named}", tuple((own, value) for value in values)
+    return Rule(table, entries, lambda _, each: getattr(each, own) not in values, says, refused)
+
+
+def _beside(table: str, entries: tuple[str, ...], other: str) -> Rule:
+    """Return the rule of entries that act where another is set."""
+    return Rule(table, entries, lambda _, each: other in each.model_fields_set, f"has no effect without {other}")
 
 
 _STRIBECK = ("stiction", "stribeck_velocity", "stribeck_exponent", "micro_damping")
 _BRISTLES = ("stiffness", "floor")
-# Entries beside a choice that one value of it does not read.
-_ENTRIES_NOT_READ = {
-    "law": {"lugre": ("reversal_speed",), "dahl": (*_STRIBECK, "reversal_speed"), "coulomb": (*_STRIBECK, *_BRISTLES)},
-    "drive": {"tension": ("position_loop",), "position": ("friction_compensation", "reversal_speed")},
-}
-_WITHOUT_EFFECT_IN_OPEN_LOOP = 'has no effect with controller.kind = "tensions"'
 
 
 def wound_tendons(scenario: Any, controller: Any) -> set[str]:
@@ -54,36 +69,16 @@ def _paths(finger: Any) -> tuple[str, ...]:
     return tuple(tendon.along for tendon in finger.tendons.values() if tendon.along)
 
 
+_OF_COULOMB, _PIECES = 'is for law = "coulomb", or one of your own', "tree.tendons.*.path.*"
 #: Of a finger, whose links or bodies, tendons and actuators are of a kind.
 OF_FINGER = (
     Rule("passive_tendon", (), lambda finger, _: finger.passive_names, "has no effect without passive tendons"),
-    Rule(
-        "tendon_friction", (), lambda finger, _: finger.tendons or finger.canals, "has no effect where no tendon rubs"
-    ),
-    Rule(
-        "joint_friction", (), lambda finger, _: any(finger.bearings), "has no effect without a joint that has a bearing"
-    ),
-    Rule(
-        "joint_friction",
-        _STRIBECK,
-        lambda _, friction: friction.law not in WITHOUT_STRIBECK,
-        'has no effect with law = "dahl" or "coulomb"',
-    ),
-    Rule(
-        "joint_friction", _BRISTLES, lambda _, friction: friction.law != "coulomb", 'has no effect with law = "coulomb"'
-    ),
-    Rule(
-        "joint_friction",
-        ("reversal_speed",),
-        lambda _, friction: friction.law not in ("lugre", "dahl"),
-        'is for law = "coulomb", or one of your own',
-    ),
-    Rule(
-        "joint_friction",
-        ("drag_asymmetry",),
-        lambda _, friction: "drag" in friction.model_fields_set,
-        "has no effect without drag",
-    ),
+    Rule("tendon_friction", (), lambda it, _: it.tendons or it.canals, "has no effect where no tendon rubs"),
+    Rule("joint_friction", (), lambda it, _: any(it.bearings), "has no effect without a joint that has a bearing"),
+    _without("joint_friction", _STRIBECK, "law", *WITHOUT_STRIBECK),
+    _without("joint_friction", _BRISTLES, "law", "coulomb"),
+    _without("joint_friction", ("reversal_speed",), "law", "lugre", "dahl", says=_OF_COULOMB),
+    _beside("joint_friction", ("drag_asymmetry",), "drag"),
     Rule(
         "stroke_limiter",
         (),
@@ -96,27 +91,10 @@ OF_FINGER = (
         lambda finger, _: finger.tree.touching or len(finger.links) > 2,
         "has no effect where no two parts but neighbours could touch",
     ),
-    Rule(
-        "joints.*", ("link",), lambda finger, _: finger.links, "has no effect beside a tree, whose bodies are the links"
-    ),
-    Rule(
-        "actuators.*",
-        ("position_loop",),
-        lambda _, actuator: actuator.drive == "position",
-        'has no effect with drive = "tension"',
-    ),
-    Rule(
-        "actuators.*",
-        ("friction_compensation", "reversal_speed"),
-        lambda _, actuator: actuator.drive == "tension",
-        'has no effect with drive = "position"',
-    ),
-    Rule(
-        "tree.tendons.*",
-        ("rest",),
-        lambda _, tendon: "stiffness" in tendon.model_fields_set,
-        "has no effect without stiffness",
-    ),
+    Rule("joints.*", ("link",), lambda it, _: it.links, "has no effect beside a tree, whose bodies are the links"),
+    _without("actuators.*", ("position_loop",), "drive", "tension"),
+    _without("actuators.*", ("friction_compensation", "reversal_speed"), "drive", "position"),
+    _beside("tree.tendons.*", ("rest",), "stiffness"),
     Rule(
         "tree.tendons.*",
         ("limit_damping", "limit_viscous"),
@@ -129,21 +107,13 @@ OF_FINGER = (
         lambda finger, tendon: any(finger.tree.tendons[name] is tendon for name in (*finger.canals, *_paths(finger))),
         "has no effect where nothing pulls the tendon",
     ),
-    Rule("tree.tendons.*.path.*", ("divisor",), lambda _, piece: piece.kind == "pulley", 'is for kind = "pulley"'),
-    Rule(
-        "tree.tendons.*.path.*",
-        ("body", "position"),
-        lambda _, piece: piece.kind != "pulley",
-        'has no effect with kind = "pulley"',
-    ),
-    Rule(
-        "tree.tendons.*.path.*",
-        ("orientation", "radius", "side", "side_point"),
-        lambda _, piece: piece.kind in ("cylinder", "sphere"),
-        'is for kind = "cylinder" or "sphere"',
-    ),
-    Rule("tree.bodies.*.solids.*", ("mesh",), lambda _, solid: solid.kind == "mesh", 'is for kind = "mesh"'),
+    _with(_PIECES, ("divisor",), "kind", "pulley"),
+    _without(_PIECES, ("body", "position"), "kind", "pulley"),
+    _with(_PIECES, ("orientation", "radius", "side", "side_point"), "kind", "cylinder", "sphere"),
+    _with("tree.bodies.*.solids.*", ("mesh",), "kind", "mesh"),
 )
+# What is put on top of a table leaves out the entries that another value of these choices does not read.
+_CHOICES = ("law", "drive")
 #: Of a hand.
 OF_HAND = (Rule("", ("fingers_touch",), lambda hand, _: len(hand.fingers) > 1, "has no effect with a single finger"),)
 _CORRECTIONS = ("tendon_friction_feedforward", "joint_friction_compensation", "passive_tension_loop", "distribution")
@@ -151,21 +121,14 @@ _CORRECTIONS = ("tendon_friction_feedforward", "joint_friction_compensation", "p
 CLOSED_LOOP = ("gain", "damping", "gravity_compensation", "spring_compensation", "fingertip_force", *_CORRECTIONS)
 #: Of a scenario; of a hand, that of each of its fingers.
 OF_SCENARIO = (
-    Rule(
-        "controller", CLOSED_LOOP, lambda _, controller: controller.kind == "proportional", _WITHOUT_EFFECT_IN_OPEN_LOOP
-    ),
+    _without("controller", CLOSED_LOOP, "controller.kind", "tensions"),
     Rule(
         "controller",
         _CORRECTIONS,
         lambda scenario, _: not scenario.finger.through_space,
         "has no effect where tendons run along paths",
     ),
-    Rule(
-        "controller",
-        ("tensions",),
-        lambda _, controller: controller.kind == "tensions",
-        'is for controller.kind = "tensions"',
-    ),
+    _with("controller", ("tensions",), "controller.kind", "tensions"),
     Rule(
         "controller",
         ("minimum_tension",),
@@ -194,25 +157,27 @@ def idle(described: Description, rules: tuple[Rule, ...]) -> Iterator[tuple[str,
     """Yield the entries that are set and have no effect: dotted name, value and message."""
     for rule in rules:
         for name, table in _tables(described, rule.table):
+            entries = table.model_fields_set
+            if entries and rule.entries:
+                entries = entries.intersection(rule.entries)
+            if not entries or rule.acts(described, table):
+                continue
             for entry in rule.entries or type(table).model_fields:
-                value = getattr(table, entry)
-                if (
-                    entry in table.model_fields_set
-                    and _differs(table, entry, value)
-                    and not rule.acts(described, table)
-                ):
-                    yield f"{name}{entry}", value, f"{rule.says}; leave it out"
+                if entry in entries and _differs(table, entry):
+                    yield f"{name}{entry}", getattr(table, entry), f"{rule.says}; leave it out"
 
 
 def without_unread(inherited: dict[str, Any], choices: dict[str, Any]) -> dict[str, Any]:
     """Return a copy of a table less the entries that another value of a choice, such as the law, does not read."""
     unread = {
         entry
-        for choice, value in choices.items()
-        if isinstance(value, str) and inherited.get(choice) != value
-        for entry in _ENTRIES_NOT_READ.get(choice, {}).get(value, ())
+        for choice in _CHOICES
+        if choice in choices and choices[choice] != inherited.get(choice)
+        for rule in OF_FINGER
+        if (choice, choices[choice]) in rule.refused
+        for entry in rule.entries
     }
-    return {entry: value for entry, value in inherited.items() if entry not in unread}
+    return without(inherited, *unread)
 
 
 def refuse_idle(described: Description, rules: tuple[Rule, ...]) -> None:
@@ -238,9 +203,9 @@ def _tables(described: Any, name: str) -> Iterator[tuple[str, Description]]:
     yield from tables
 
 
-def _differs(table: Description, entry: str, value: Any) -> bool:
+def _differs(table: Description, entry: str) -> bool:
     """Return whether a value, one number or one each, differs from the default and from zero."""
-    default = type(table).model_fields[entry].default
+    value, default = getattr(table, entry), type(table).model_fields[entry].default
     uniform = isinstance(value, tuple) and all(each == default for each in value)
     # Zero asks for none of what there is not.
     none = not isinstance(value, bool) and value == 0

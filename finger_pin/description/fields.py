@@ -11,13 +11,25 @@ from pydantic.fields import FieldInfo
 
 def field_names(model: type[BaseModel], location: Iterable[str]) -> list[str]:
     """Return the field names of the model found by following a location through nested models and tables."""
-    current: Any = model
+    found = _model_at(model, location)
+    return [*getattr(found, "model_fields", ()), *getattr(found, "file_keys", ())]
+
+
+def find_field(model: type[BaseModel], location: Sequence[str]) -> FieldInfo | None:
+    """Return the field at a location through nested models and tables, or None if there is none."""
+    field: FieldInfo | None = getattr(_model_at(model, location[:-1]), "model_fields", {}).get(location[-1])
+    return field
+
+
+def _model_at(model: type[BaseModel], location: Iterable[str]) -> Any:
+    """Return what is at a location, a model if there is one; for a table of models, a dictionary that says so."""
+    found: Any = model
     for part in location:
-        if isinstance(current, type) and issubclass(current, BaseModel):
-            current = _inner(current.model_fields[part].annotation)
-        elif isinstance(current, dict):
-            current = current["values"]
-    return [*getattr(current, "model_fields", ()), *getattr(current, "file_keys", ())]
+        fields = getattr(found, "model_fields", {})
+        found = (
+            found["values"] if isinstance(found, dict) else _inner(fields[part].annotation if part in fields else None)
+        )
+    return found
 
 
 def _inner(annotation: Any) -> Any:
@@ -30,30 +42,24 @@ def _inner(annotation: Any) -> Any:
     return models[0] if models else annotation
 
 
-def find_field(model: type[BaseModel], location: Sequence[str]) -> FieldInfo | None:
-    """Return the field at a location through nested models and tables, or None if there is none."""
-    owner: Any = model
-    for part in location[:-1]:
-        fields = getattr(owner, "model_fields", {})
-        owner = (
-            owner["values"] if isinstance(owner, dict) else _inner(fields[part].annotation if part in fields else None)
-        )
-    field: FieldInfo | None = getattr(owner, "model_fields", {}).get(location[-1])
-    return field
-
-
 def document(model: type[BaseModel], location: Sequence[str]) -> str:
     """Return what the field at a location is, in words."""
     field = find_field(model, location)
     return str(field.description if field and field.description else "a table")
 
 
+def without(table: Mapping[str, Any], *entries: str) -> dict[str, Any]:
+    """Return a table less some entries."""
+    return {name: value for name, value in table.items() if name not in entries}
+
+
 def nested(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Return ``{index.medial = ...}`` as ``{index = {medial = ...}}``, as files have it; tables in it are copies."""
+    """Return ``{index.medial = ...}`` as ``{index = {medial = ...}}``, as files have it."""
+    if "." not in "".join(table):
+        return dict(table)
     outer: dict[str, Any] = {}
     for name, value in table.items():
         finger, dot, inner = name.partition(".")
-        value = nested(value) if isinstance(value, dict) else value
         if dot:
             outer.setdefault(finger, {})[inner] = value
         else:

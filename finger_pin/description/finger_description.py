@@ -267,10 +267,6 @@ class HandSettings(Description):
         refuse_idle(self, OF_HAND)
         return self
 
-    def parts(self) -> dict[str, HandSettings]:
-        """Return hands of one finger each, by name."""
-        return {name: self.updated(fingers={name: placed}, name=name) for name, placed in self.fingers.items()}
-
     def built(self) -> dict[str, FingerDescription]:
         """Return the fingers as they are on the hand, by name: to scale, with gravity in their own base frames."""
         return {name: placed_finger(name, placed, self.gravity) for name, placed in self.fingers.items()}

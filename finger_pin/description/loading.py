@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -13,13 +12,13 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 import tomli_w
 
-from finger_pin.description.fields import find_field
+from finger_pin.description.fields import find_field, without
 from finger_pin.description.finger_description import FingerDescription, HandSettings
 from finger_pin.description.recordings.bench import IdentifySettings
-from finger_pin.description.recordings.signal_files import resolve_commands, resolve_signals
-from finger_pin.description.resolution import kind_of, override, read_scenario_file, refuse_other
+from finger_pin.description.recordings.signal_files import with_commands, with_signals
+from finger_pin.description.resolution import kind_of, overridden, read_scenario_file, refuse_other
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.tables import Series, as_name, entry_at, is_path, match_paths, merge, packed, shipped, split
+from finger_pin.description.tables import Series, entry_at, is_path, match_paths, merge, packed, shipped, split
 from finger_pin.description.validation import Description, Table, as_table, suggestion, validate
 from finger_pin.exceptions import InputError
 
@@ -115,19 +114,21 @@ def load_scenario(name: ScenarioLike, overrides: Mapping[str, Any] | None = None
     Raises:
         InputError: Naming the entry that is wrong.
     """
-    if not overrides and isinstance(name, Scenario):
-        return name
+    if isinstance(name, Scenario):
+        return _scenario(name.set_entries(), Path(), overrides) if overrides else name
     if not overrides and not is_path(str(name)):
         return _shipped_scenario(str(name))
-    if isinstance(name, Scenario):
-        return _resolved(overrides, "", name.set_entries())
-    return _resolved(overrides, str(name), *read_scenario_file(str(name), Path()))
+    return _named_scenario(str(name), overrides)
 
 
-@cache
-def _shipped_scenario(name: str) -> Scenario:
-    """Return a scenario that ships; it is frozen, so that all may have the same one."""
-    return _resolved(None, name, *read_scenario_file(name, Path()))
+def _named_scenario(name: str, overrides: Mapping[str, Any] | None = None) -> Scenario:
+    """Return the scenario of a name or path."""
+    table, folder = read_scenario_file(name, Path())
+    return _scenario(without(table, "identify"), folder, overrides)
+
+
+# It is frozen, so that all may have the same one.
+_shipped_scenario = cache(_named_scenario)
 
 
 @_depth_limited("scenario")
@@ -150,12 +151,14 @@ def load_bench(
         allowed = f"no such bench; there are {', '.join(benches)}, or the path of a .toml file{hint}"
         raise InputError("bench", allowed, name)
     table, folder = ({}, Path()) if isinstance(name, Scenario) else read_scenario_file(str(name), Path(), bench=True)
-    entries = merge(as_table(table.pop("identify", None)), dict(identify or {}))
+    entries = merge(as_table(table.get("identify")), dict(identify or {}))
     if not entries:
         raise InputError("identify", "is missing: which parameters are to be found, and from which recordings")
-    scenario = isinstance(name, Scenario)
-    name = load_scenario(name, overrides) if scenario else _resolved(overrides, str(name), table, folder)
-    return name, validate(IdentifySettings, entries, ("identify",))
+    if isinstance(name, Scenario):
+        scenario = load_scenario(name, overrides)
+    else:
+        scenario = _scenario(without(table, "identify"), folder, overrides)
+    return scenario, validate(IdentifySettings, entries, ("identify",))
 
 
 @_depth_limited("scenario")
@@ -165,25 +168,19 @@ def read_scenario(table: Mapping[str, Any], overrides: Mapping[str, Any] | None 
     Raises:
         InputError: Naming the entry that is wrong.
     """
-    return _resolved(overrides, "", copy.deepcopy(dict(table)))
+    return _scenario(dict(table), Path(), overrides)
 
 
-def _resolved(overrides: Mapping[str, Any] | None, name: str, table: Table, folder: Path = Path()) -> Scenario:
-    """Return the scenario of a table, which is changed; descriptions that no key touches stay the same objects."""
-    if name:
-        table.pop("identify", None)
-        table.setdefault("name", as_name(Path(name).stem))
-    override(table, overrides, folder)
-    resolve_signals(table, Path())
-    resolve_commands(table)
-    return validate(Scenario, table, ())
+def _scenario(table: Table, folder: Path, overrides: Mapping[str, Any] | None) -> Scenario:
+    """Return the scenario of a table; descriptions that no key touches stay the same objects."""
+    table = overridden(table, overrides, folder)
+    return validate(Scenario, with_commands(with_signals(table, Path())), ())
 
 
 def _load(kind: str, model: type[_Described], name: Any, overrides: Mapping[str, Any] | None) -> _Described:
     """Load a finger or a hand."""
-    table: Table = {kind: name if isinstance(name, model) else str(name)}
     with _depth_limited(kind):
-        override(table, overrides, section=kind)
+        table = overridden({kind: name if isinstance(name, model) else str(name)}, overrides, sections=(kind,))
         return validate(model, table[kind], (kind,))
 
 
@@ -239,7 +236,7 @@ class ParametrisedScenario:
             # Its name is wrong, or nothing is there.
             if index is not None:
                 raise InputError(name, "has no numbers of which one could be given; give all of them")
-            override(scenario.set_entries(), {name: 0.0})
+            overridden(scenario.set_entries(), {name: 0.0})
             if "*" not in name and find_field(Scenario, name.split(".")) is None:
                 load_scenario(scenario, {name: 0.0})
 

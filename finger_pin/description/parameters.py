@@ -11,6 +11,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
+from finger_pin.description.caching import memoised
 from finger_pin.description.validation import (
     IN_RADIANS,
     MILLIMETRES,
@@ -276,6 +277,8 @@ def _are_names(value: object) -> bool:
     return isinstance(value, tuple) and any(isinstance(item, str) for item in value)
 
 
+# Found again where they are in several fingers: beside another number, at another scale, or on a hand.
+@memoised(lambda table, size: (table, size), most=256)
 def per_item(table: Description, size: int) -> dict[str, Array]:
     """Return the numbers of a table by entry, read-only, shape (size,); NaN where a hand's finger has none."""
     numbers = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import lru_cache, reduce
 from typing import Annotated, Any, Self, TypeVar
 
@@ -12,15 +12,14 @@ from scipy.spatial.transform import Rotation
 
 from finger_pin.description.actuators import Actuator
 from finger_pin.description.caching import memoised
-from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
-from finger_pin.description.parameters import Joint, Link, PassiveTendon, StrokeLimiterSettings, Tendon
-from finger_pin.description.signals import SignalSettings
-from finger_pin.description.tables import Series, series
+from finger_pin.description.friction import JointFrictionSettings
+from finger_pin.description.parameters import Joint, Link, Tendon, per_item
+from finger_pin.description.signals import Samples, SignalSettings, signal_field
+from finger_pin.description.tables import series
 from finger_pin.description.validation import (
     MILLIMETRES,
     Description,
     Name,
-    Numbers,
     problem,
     quantity,
     real,
@@ -80,6 +79,12 @@ def _scaled_joint(joint: Joint, scale: float) -> Joint:
     return joint.updated(link=joint.link and _scaled_link(joint.link, scale))
 
 
+@memoised(lambda friction, joints, scale: (friction, joints, scale))
+def _scaled_friction(friction: JointFrictionSettings, joints: int, scale: float) -> JointFrictionSettings:
+    numbers = per_item(friction, joints)
+    return friction.updated(**{key: tuple((scale * numbers[key]).tolist()) for key in ("coulomb", "stiction")})
+
+
 def scaled(finger: _Finger, scale: float) -> _Finger:
     """Return a finger of the same shape and material in another size.
 
@@ -92,10 +97,8 @@ def scaled(finger: _Finger, scale: float) -> _Finger:
     tables: Any = finger
     joints = {name: _scaled_joint(joint, scale) for name, joint in tables.joints.items()}
     tendons = {name: _scaled_tendon(tendon, scale) for name, tendon in tables.tendons.items()}
-    friction = tables.joint_friction
-    lengths = {key: tuple((scale * tables.numbers["joint_friction"][key]).tolist()) for key in ("coulomb", "stiction")}
-    update = {"joints": joints, "tendons": tendons, "joint_friction": friction.updated(**lengths)}
-    return finger.updated(**update)
+    friction = _scaled_friction(tables.joint_friction, len(joints), scale)
+    return finger.updated(joints=joints, tendons=tendons, joint_friction=friction)
 
 
 @memoised(lambda name, placed, gravity: (name, placed, gravity))
@@ -121,10 +124,14 @@ def joined_entries(hand: Any, parts: Mapping[str, Any]) -> dict[str, Any]:
             name: _tendon_of_hand(name.split(".")[0], tendon)
             for name, tendon in sorted(tendons.items(), key=lambda item: item[1].kind)
         },
-        "tendon_friction": _joined_table(parts, "tendon_friction", TendonFrictionSettings),
-        "joint_friction": _joined_table(parts, "joint_friction", JointFrictionSettings),
-        "passive_tendon": _joined_table(parts, "passive_tendon", PassiveTendon),
-        "stroke_limiter": _joined_table(parts, "stroke_limiter", StrokeLimiterSettings),
+        **{
+            group: _joined_table(
+                group,
+                tuple(getattr(part, group) for part in parts.values()),
+                tuple(_kinds(part, group) for part in parts.values()),
+            )
+            for group in ("tendon_friction", "joint_friction", "passive_tendon", "stroke_limiter")
+        },
         "actuators": {name: _actuator_of_hand(name.split(".")[0], actuator) for name, actuator in actuators.items()},
         "touches_itself": any(part.touches_itself for part in parts.values()),
     }
@@ -141,12 +148,6 @@ def _actuator_of_hand(finger: str, actuator: Actuator) -> Actuator:
     return actuator.updated(tendons=tuple(f"{finger}.{tendon}" for tendon in actuator.tendons))
 
 
-def _joined_table(parts: Mapping[str, Any], group: str, table: type[Description]) -> Description:
-    """Return one table for all fingers, with lists of numbers in the order of the hand."""
-    tables = [getattr(part, group) for part in parts.values()]
-    return table.model_construct(**_joined_lists(tables, [_kinds(part, group) for part in parts.values()]))
-
-
 def _kinds(part: Any, group: str) -> tuple[str, ...]:
     """Return the kinds by which the numbers of a table are ordered: actuated tendons of all before passive ones."""
     if group == "tendon_friction":
@@ -154,49 +155,38 @@ def _kinds(part: Any, group: str) -> tuple[str, ...]:
     return ("",) * len(part.passive_names if group == "passive_tendon" else part.joints)
 
 
-def _joined_lists(tables: Sequence[Description], kinds: Sequence[Sequence[str]]) -> dict[str, Any]:
+@memoised(lambda group, tables, kinds: (group, *tables, kinds), most=_MOST_PARTS)
+def _joined_table(group: str, tables: tuple[Description, ...], kinds: tuple[tuple[str, ...], ...]) -> Description:
+    """Return one table for all fingers, with lists of numbers in the order of the hand."""
     of_all = [kind for of_table in kinds for kind in of_table]
     order = sorted(range(len(of_all)), key=of_all.__getitem__)
-    lists: dict[str, Any] = {}
+    joined: dict[str, Any] = {}
     for entry in type(tables[0]).model_fields:
+        values = [getattr(table, entry) for table in tables]
         if entry in ("law", "place"):
-            group = "joint_friction" if entry == "law" else "tendon_friction"
-            lists[entry] = _common_value(f"{group}.{entry}", [getattr(table, entry) for table in tables])
+            if len({*values}) > 1:
+                listed = ", ".join(dict.fromkeys(values))
+                raise InputError("hand.fingers", f"must have one {group}.{entry}, not {listed}")
+            joined[entry] = values[0]
             continue
-        pairs = zip(tables, kinds, strict=True)
         numbers = [
-            number for table, kinds_of_table in pairs for number in _numbers(getattr(table, entry), len(kinds_of_table))
+            number
+            for value, own in zip(values, kinds, strict=True)
+            for number in (value if isinstance(value, tuple) else [None if value is None else float(value)] * len(own))
         ]
-        lists[entry] = tuple([numbers[place] for place in order])
-    return lists
-
-
-def _common_value(key: str, values: Sequence[str]) -> str:
-    """Return the value of all fingers."""
-    if len({*values}) > 1:
-        raise InputError("hand.fingers", f"must have one {key}, not {', '.join(dict.fromkeys(values))}")
-    return values[0]
-
-
-def _numbers(value: Numbers | None, size: int) -> Sequence[float | None]:
-    return value if isinstance(value, tuple) else [None if value is None else float(value)] * size
+        joined[entry] = tuple([numbers[place] for place in order])
+    return tables[0].model_construct(**joined)
 
 
 class PathSignal(SignalSettings):
     """A coordinate of the palm over time: m for x, y, z, rad for roll, pitch, yaw."""
 
-    offset: Annotated[float, _COORDINATE] = quantity(
-        0.0, unit="m or rad", source="chosen", doc="Added to all of it; the mean of a sinusoid."
+    offset: Annotated[float, _COORDINATE] = signal_field("offset", "m or rad")
+    amplitude: Annotated[float, _COORDINATE] = signal_field("amplitude", "m or rad")
+    height: Annotated[float, _COORDINATE] | None = signal_field(
+        "height", "m or rad", "Of steps and ramps, which are refused here."
     )
-    amplitude: Annotated[float, _COORDINATE] = quantity(
-        0.0, unit="m or rad", source="chosen", doc="Amplitude of the sinusoid, half its swing."
-    )
-    height: Annotated[float, _COORDINATE] | None = quantity(
-        None, unit="m or rad", source="chosen", doc="Of steps and ramps, which are refused here."
-    )
-    values: Annotated[tuple[float, ...] | Series, series(-12.5, 12.5)] | None = quantity(
-        None, unit="m or rad", source="chosen", doc="At the points or samples."
-    )
+    values: Annotated[Samples, series(-12.5, 12.5)] | None = signal_field("values", "m or rad")
 
     @model_validator(mode="after")
     def _accelerates(self) -> Self:

@@ -1,8 +1,7 @@
-"""From files, names and overrides to one complete table: bases, motors, and values by dotted key."""
+"""From files, names and overrides to one complete table, by steps that change none of the tables they are given."""
 
 from __future__ import annotations
 
-import copy
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
@@ -11,8 +10,8 @@ from pathlib import Path
 from typing import Any, TypeAlias, get_origin
 
 from finger_pin.description.effects import without_unread
-from finger_pin.description.fields import find_field
-from finger_pin.description.recordings.signal_files import placed_fingers, resolve_signals
+from finger_pin.description.fields import find_field, without
+from finger_pin.description.recordings.signal_files import placed_fingers, with_signals
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.tables import (
     INHERIT_NOTHING,
@@ -32,6 +31,8 @@ _Opened: TypeAlias = tuple[Path, ...]
 # Keys that put another finger or hand in place of what there is.
 _OTHER_FINGER = re.compile(r"(hand|finger|hand\.fingers\.[^.]+\.finger)(\.base)?")
 _PLACE = re.compile(r"hand\.fingers\.[^.]+")
+# What a scenario has instead of each.
+_OTHER_KIND = {"hand": "finger", "finger": "hand"}
 # Tables by joint or tendon, and which of the two.
 _BY_NAME = {
     ("reference", "joints"): "joint",
@@ -81,27 +82,23 @@ def read_scenario_file(name: str, folder: Path, opened: _Opened = (), bench: boo
     if (bench or name not in shipped_texts("scenarios")) and name in shipped_texts("benches"):
         name = str(resources.files("finger_pin.description").joinpath(f"benches/{name}.toml"))
     table, folder, opened = _open("scenario", name, folder, opened)
-    resolve_signals(table, folder)
-    for recording in as_table(as_table(table.get("identify")).get("recordings")).values():
-        file = as_table(recording).get("file")
-        if isinstance(file, str):
-            # A scenario that extends this one finds it, too.
-            recording["file"] = str((folder / expand(file)).absolute())
+    table = with_signals(table, folder)
     if "extends" not in table:
         return table, folder
-    base = table.pop("extends")
+    base, table = table["extends"], without(table, "extends")
     if not isinstance(base, str):
         raise InputError("extends", "must be the name or path of another scenario", base)
     parent, parent_folder = read_scenario_file(base, folder, opened)
-    parent.pop("name", None)
-    for kind, other in (("finger", "hand"), ("hand", "finger")):
+    parent = without(parent, "name")
+    for kind, other in _OTHER_KIND.items():
         if kind in parent:
-            parent[kind] = resolve(kind, parent[kind], parent_folder)
+            parent = parent | {kind: resolve(kind, parent[kind], parent_folder)}
         if other in table or _replaces(table.get(kind)):
-            parent.pop(kind, None)
-    if "hand" in parent and "hand" in table:
-        table["hand"] = _merge_hand(parent.pop("hand"), table["hand"], folder)
-    return merge(parent, table), folder
+            parent = without(parent, kind)
+    merged = merge(parent, table)
+    if "hand" in parent and isinstance(table.get("hand"), dict):
+        merged = merged | {"hand": _merge_hand(parent["hand"], table["hand"], folder)}
+    return merged, folder
 
 
 def _open(kind: str, name: str, folder: Path, opened: _Opened, entry: str = "") -> tuple[Table, Path, _Opened]:
@@ -111,29 +108,31 @@ def _open(kind: str, name: str, folder: Path, opened: _Opened, entry: str = "") 
     if identity in opened:
         entry = entry or ("extends" if kind == "scenario" else f"{kind}.base")
         raise InputError(entry, f"a {kind} cannot start from itself", name)
+    if kind != "motor":
+        table = {"name": as_name(Path(name).stem)} | table
     return table, path.parent, (*opened, identity)
 
 
 def resolve(kind: str, value: Any, folder: Path, opened: _Opened = (), entry: str = "") -> Any:
     """Return the table of a finger, hand or motor given by name, by path, or as a table that may start from a base."""
     if isinstance(value, str):
-        table, folder, opened = _open(kind, value, folder, opened, entry)
-        if kind != "motor":
-            table.setdefault("name", as_name(Path(value).stem))
-        return resolve(kind, table, folder, opened, entry)
+        value, folder, opened = _open(kind, value, folder, opened, entry)
     if isinstance(value, Description) or (kind == "motor" and not isinstance(value, dict)):
         return value
     if not isinstance(value, dict):
         raise InputError(kind, f"must be the name of a {kind}, the path of a .toml file, or a table", value)
-    top, base = dict(value), {}
-    if "base" in top:
-        base = top.pop("base")
+    top, base = without(value, "base"), {}
+    if "base" in value:
+        base = value["base"]
         if kind != "motor" and not isinstance(base, str if kind == "finger" else str | dict):
             raise InputError(f"{kind}.base", f"must be the name or path of a {kind}", base)
         base = as_table(resolve(kind, base, folder, opened, entry))
     if kind == "hand":
         return _merge_hand(base, top, folder)
-    return with_motors(merge(base, top), folder) if kind == "finger" else merge(base, top)
+    merged = merge(base, top)
+    if kind == "finger" and "actuators" in merged:
+        return merged | {"actuators": _with_motors(merged["actuators"], folder)}
+    return merged
 
 
 def _replaces(finger: Any) -> bool:
@@ -141,13 +140,14 @@ def _replaces(finger: Any) -> bool:
     return isinstance(finger, str) or "base" in as_table(finger)
 
 
-def with_motors(finger: Table, folder: Path) -> Table:
-    """Replace names and paths of motors in a finger by their tables; return the finger."""
-    for name, actuator in as_table(finger.get("actuators")).items():
-        if isinstance(actuator, dict) and "motor" in actuator:
-            entry = f"finger.actuators.{name}.motor"
-            actuator["motor"] = resolve("motor", actuator["motor"], folder, entry=entry)
-    return finger
+def _with_motors(actuators: Any, folder: Path) -> Any:
+    """Return the actuators of a finger with the tables of their motors in place of names and paths."""
+    motors = {
+        name: {**each, "motor": resolve("motor", each["motor"], folder, entry=f"finger.actuators.{name}.motor")}
+        for name, each in as_table(actuators).items()
+        if isinstance(each, dict) and "motor" in each
+    }
+    return actuators | motors if motors else actuators
 
 
 def _merge_hand(base: Table, hand: Table, folder: Path) -> Table:
@@ -155,47 +155,46 @@ def _merge_hand(base: Table, hand: Table, folder: Path) -> Table:
 
     What is the name or path of a finger, and no table, is that finger where its place is the base's.
     """
-    fingers = as_table(as_table(hand).get("fingers"))
+    inherited, fingers = as_table(base.get("fingers")), as_table(hand.get("fingers"))
     for name, placed in fingers.items():
         if isinstance(placed, str) and placed != INHERIT_NOTHING:
-            placed = fingers[name] = {"finger": placed}
+            placed = {"finger": placed}
         finger = as_table(placed).get("finger")
-        if _replaces(finger):
-            try:
-                placed["finger"] = resolve("finger", finger, folder)
-            except InputError as error:
-                raise InputError(f"hand.fingers.{name}.{error.entry}", error.allowed, error.value) from None
-            as_table(as_table(base.get("fingers")).get(name)).pop("finger", None)
-    return merge(base, hand)
+        if not _replaces(finger):
+            continue
+        try:
+            fingers = fingers | {name: {**placed, "finger": resolve("finger", finger, folder)}}
+        except InputError as error:
+            raise InputError(f"hand.fingers.{name}.{error.entry}", error.allowed, error.value) from None
+        if name in inherited:
+            inherited = inherited | {name: without(as_table(inherited[name]), "finger")}
+    return merge(base | {"fingers": inherited} if inherited else base, hand | {"fingers": fingers} if fingers else hand)
 
 
-def override(table: Table, overrides: Mapping[str, Any] | None, folder: Path = Path(), section: str = "") -> None:
-    """Resolve the fingers of a table, and apply overrides: other fingers before entries on top of them."""
-    overrides = _normalised(overrides or {}, [section] if section else [*Scenario.model_fields])
+def overridden(
+    table: Table, overrides: Mapping[str, Any] | None, folder: Path = Path(), sections: Iterable[str] = ()
+) -> Table:
+    """Return a table with its finger or hand resolved, and overrides: other fingers before entries on top of them."""
+    overrides = _normalised(overrides or {}, sections or Scenario.model_fields)
     whole = {key: value for key, value in overrides.items() if _OTHER_FINGER.fullmatch(key)}
-    for kind, other in (("hand", "finger"), ("finger", "hand")):
-        chosen = {key: whole.pop(key) for key in (kind, f"{kind}.base") if key in whole}
+    for kind, other in _OTHER_KIND.items():
+        chosen = {key: whole[key] for key in (kind, f"{kind}.base") if key in whole}
         if chosen:
-            table.pop(other, None)
-        _apply(chosen, table)
+            table, whole = _applied(chosen, without(table, other)), without(whole, *chosen)
     entries = {key: value for key, value in overrides.items() if not _OTHER_FINGER.fullmatch(key)}
     for key in (*whole, *entries):
         refuse_other(key, hand="hand" in table, finger="finger" in table)
-    if "hand" in table:
-        table["hand"] = resolve("hand", table["hand"], folder)
-        _apply(_expand_wildcards(whole, table), table)
-        table["hand"] = resolve("hand", table["hand"], folder)
-    elif "finger" not in table:
+    kind = "hand" if "hand" in table else "finger"
+    if kind not in table:
         raise InputError("finger", 'is missing; name a finger, such as finger = "ub", or describe one')
-    else:
-        table["finger"] = resolve("finger", table["finger"], folder)
+    table = table | {kind: resolve(kind, table[kind], folder)}
+    if whole:
+        table = _applied(_expand_wildcards(whole, table), table)
+        table = table | {kind: resolve(kind, table[kind], folder)}
     entries = _expand_wildcards(entries, table)
     # A choice comes before what belongs to it, and a motor before its entries.
     first = (".kind", ".motor", ".law", ".drive")
-    for early in (True, False):
-        _apply({key: value for key, value in entries.items() if key.endswith(first) == early}, table)
-        for owner in placed_fingers(table).values() or [table]:
-            with_motors(as_table(as_table(owner).get("finger")), Path())
+    return _applied({key: entries[key] for key in sorted(entries, key=lambda key: not key.endswith(first))}, table)
 
 
 def _expand_wildcards(overrides: Table, table: Table) -> Table:
@@ -210,34 +209,36 @@ def refuse_other(key: str, *, hand: bool, finger: bool) -> None:
         raise InputError(key, 'there is one finger; hand = "ub_hand" puts a hand in its place')
 
 
-def _apply(overrides: Mapping[str, Any], table: Table) -> None:
+def _applied(overrides: Mapping[str, Any], table: Table) -> Table:
+    """Return a table with values at dotted keys."""
     for key, value in overrides.items():
-        *path, last = key.split(".")
-        inner = table
-        for depth, part in enumerate(path):
-            _refuse_new([*path[:depth], part], inner, table)
-            below = inner.get(part)
-            if isinstance(below, str) and part in ("finger", "hand"):
-                below = {"base": below}
-            if not isinstance(below, dict | Description | None):
-                raise InputError(key, f"{'.'.join(path[: depth + 1])} has no entries of its own", value)
-            # Of a description what lies on the way becomes a table; all else stays, checked.
-            inner[part] = inner = as_table(below)
-        if last == "kind" and isinstance(value, str) and is_other_kind(inner, {"kind": value}):
-            inner.clear()
-        _refuse_new([*path, last], inner, table)
-        read = without_unread(inner, {last: value})
-        for unread in inner.keys() - read.keys():
-            del inner[unread]
-        if last in inner and isinstance(value, str) and value == INHERIT_NOTHING:
-            del inner[last]
-        else:
-            inner[last] = copy.deepcopy(value)
+        table = _with_entry(table, tuple(key.split(".")), 0, value, table)
+    return table
 
 
-def _refuse_new(path: list[str], siblings: Table, table: Table) -> None:
+def _with_entry(whole: Table, key: tuple[str, ...], depth: int, value: Any, table: Table) -> Table:
+    """Return the table at a depth of a key, with the value at its end; of a description on the way a table."""
+    part, place, end = key[depth], key[: depth + 1], depth + 1 == len(key)
+    below = table.get(part)
+    if end and part == "kind" and isinstance(value, str) and is_other_kind(table, {"kind": value}):
+        table = {}
+    _refuse_new(place, table, whole)
+    if not end:
+        if isinstance(below, str) and part in ("finger", "hand"):
+            below = {"base": below}
+        if not isinstance(below, dict | Description | None):
+            raise InputError(".".join(key), f"{'.'.join(place)} has no entries of its own", value)
+        value = _with_entry(whole, key, depth + 1, value, as_table(below))
+    elif isinstance(value, str) and value == INHERIT_NOTHING and part in table:
+        return without(table, part)
+    if place[-2:] == ("finger", "actuators"):
+        value = _with_motors(value, Path())
+    return without_unread(table, {part: value}) | {part: value}
+
+
+def _refuse_new(path: tuple[str, ...], siblings: Table, table: Table) -> None:
     """Refuse an override that would bring a joint, a tendon or the like into being: only a file does."""
-    *owner, name = path
+    owner, name = path[:-1], path[-1]
     if name in siblings:
         return
     finger = as_table(table.get("finger"))
@@ -252,12 +253,12 @@ def _refuse_new(path: list[str], siblings: Table, table: Table) -> None:
         present |= {("controller", "fingers"): ("finger", hand), ("environment", "fingers"): ("finger", hand)}
     present["environment", "objects"] = "object", siblings
     field = find_field(Scenario, owner) if owner else None
-    if tuple(owner) not in present and (field is None or get_origin(field.annotation) is not dict):
+    if owner not in present and (field is None or get_origin(field.annotation) is not dict):
         return
-    kind, names = present.get(tuple(owner), (owner[-1].removesuffix("s"), siblings))
+    kind, names = present.get(owner, (owner[-1].removesuffix("s"), siblings))
     if name not in names:
         allowed = f"no such {kind}; there are {', '.join(names) or 'none'}"
-        if not names and (kind == "object" or tuple(owner) not in present):
+        if not names and (kind == "object" or owner not in present):
             allowed = f"{allowed}; {'.'.join(owner)} = {{ {name} = {{ ... }} }} puts it there"
         raise InputError(".".join(path), f"{allowed}{suggestion(name, names)}")
 
@@ -278,8 +279,6 @@ def _normalised(overrides: Mapping[str, Any], sections: Iterable[str]) -> Table:
             key = f"{key}.finger"
         if _OTHER_FINGER.fullmatch(key):
             value = _absolute(value)
-        if key.endswith("finger") and isinstance(value, dict) and "base" in value:
-            value = {**value, "base": _absolute(value["base"])}
         checked[key] = value
     return checked
 
@@ -294,4 +293,6 @@ def _flatten_overrides(overrides: Mapping[str, Any]) -> Iterator[tuple[str, Any]
 
 
 def _absolute(finger: Any) -> Any:
+    if isinstance(finger, dict) and "base" in finger:
+        return {**finger, "base": _absolute(finger["base"])}
     return str(expand(finger).absolute()) if isinstance(finger, str) and is_path(finger) else finger

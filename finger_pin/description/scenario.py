@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 from pydantic_core import PydanticCustomError
 
+from finger_pin.description.caching import memoised
 from finger_pin.description.commands import BY_NAME, BY_SOURCE
 from finger_pin.description.controller import ControllerSettings, check_controller
 from finger_pin.description.coupling import PassiveCoupling
@@ -88,20 +89,20 @@ class Scenario(Description):
 
     def _choose_kind(self) -> None:
         """Choose the open loop for fingers without closed-loop settings that can run in open loop alone."""
-        alone, chosen = {} if self.hand is None else self.hand.parts(), {}
-        for name in alone or ("",):
+        fingers, chosen = tuple(self.hand.fingers) if self.hand else ("",), {}
+        for name in fingers:
             settings, prefix = settings_of_finger(self.controller, name), f"{name}." if name else ""
             chosen_loop = settings.model_fields_set & {"kind", *CLOSED_LOOP}
             if chosen_loop or any(key.startswith(prefix) for key in self.reference.joints):
                 continue
-            if (self._part(name, alone[name]) if alone else self)._is_open():
+            if (self._part(name) if name else self)._is_open():
                 entries = {key: getattr(settings, key) for key in settings.model_fields_set - {"sampling", "fingers"}}
                 chosen[name] = ControllerSettings().updated(**entries, kind="tensions")
-        if len(chosen) == max(len(alone), 1):
+        if len(chosen) == len(fingers):
             object.__setattr__(self, "controller", self.controller.updated(kind="tensions"))
         elif chosen:
-            fingers = {**(self.controller.fingers or {}), **chosen}
-            object.__setattr__(self, "controller", self.controller.updated(fingers=fingers))
+            own = {**(self.controller.fingers or {}), **chosen}
+            object.__setattr__(self, "controller", self.controller.updated(fingers=own))
 
     def _is_open(self) -> bool:
         """Return whether a finger is given tensions, or can be driven by them in open loop alone."""
@@ -160,15 +161,23 @@ class Scenario(Description):
             return {"": self}
         if len(self.hand.fingers) == 1 and not (self.controller.fingers or self.environment.fingers):
             return dict.fromkeys(self.hand.fingers, self)
-        return {name: self._part(name, alone) for name, alone in self.hand.parts().items()}
+        return self._parts(*self.hand.fingers)
+
+    # Who runs it asks again for what checked it.
+    @memoised(lambda self, *fingers: (self, *fingers), most=8)
+    def _parts(self, *fingers: str) -> dict[str, Scenario]:
+        return {name: self._part(name) for name in fingers}
 
     def environments(self) -> dict[str, EnvironmentSettings]:
         """Return the environments of a hand's fingers or a tree's tips, by name; of a single one under no name."""
         shared = self.environment
         names = self.finger.tree.tip_names if self.hand is None else tuple(self.hand.fingers)
-        return {name: settings_of_finger(shared, name) if shared.fingers else shared for name in names} or {"": shared}
+        return {name: settings_of_finger(shared, name) for name in names} or {"": shared}
 
-    def _part(self, name: str, alone: HandSettings) -> Scenario:
+    def _part(self, name: str) -> Scenario:
+        assert self.hand is not None
+        alone = self.hand.updated(fingers={name: self.hand.fingers[name]}, name=name)
+
         def entries_of_finger(table: Mapping[str, _Item]) -> dict[str, _Item]:
             return {key: each for key, each in table.items() if key.startswith(f"{name}.")}
 
@@ -183,7 +192,7 @@ class Scenario(Description):
                 )
         simulation, initial = self.simulation, self.simulation.initial
         if initial is not None:
-            start = {"position": entries_of_finger(initial.position), "velocity": entries_of_finger(initial.velocity)}
+            start = {entry: entries_of_finger(getattr(initial, entry)) for entry in ("position", "velocity")}
             simulation = simulation.updated(initial=start)
         return self.updated(
             finger=alone.joined(),
@@ -206,22 +215,17 @@ class Scenario(Description):
         initial = self.simulation.initial or InitialSettings()
         keyframes, joints = tuple(self.finger.tree.keyframes), tuple(self.finger.joints)
         fingers = tuple(self.hand.fingers) if self.hand else self.finger.tree.tip_names
+        commanded = {
+            table: [key.partition(".")[0] for key in getattr(self.controller, table) or () if self.hand]
+            for table in BY_NAME
+        }
         tables: dict[str, tuple[Iterable[str], str, tuple[str, ...]]] = {
             "reference.joints": (self.reference.joints, "joint", joints),
             "simulation.initial.position": (initial.position, "joint", joints),
             "simulation.initial.velocity": (initial.velocity, "joint", joints),
             "simulation.initial.keyframe": ([initial.keyframe] if initial.keyframe else (), "keyframe", keyframes),
             "controller.fingers": (self.controller.fingers or (), "finger", fingers),
-            **{
-                f"controller.{table}": (
-                    dict.fromkeys(
-                        key.partition(".")[0] for key in (getattr(self.controller, table) or {}) if self.hand
-                    ),
-                    "finger",
-                    fingers,
-                )
-                for table in BY_NAME
-            },
+            **{f"controller.{table}": (names, "finger", fingers) for table, names in commanded.items()},
             "environment.fingers": (self.environment.fingers or (), "finger", fingers),
         }
         for name, settings in (self.controller.fingers or {}).items():
@@ -261,9 +265,8 @@ class Scenario(Description):
     def _check_taut(self, routing: Routing, missing: str) -> None:
         """Raise unless springs keep the tendons taut that (22) cannot without force closure."""
         if not any(joint.spring for joint in self.finger.joints.values()):
-            raise problem(
-                "finger.tendons", f"{missing}; the controller needs force closure, {_OPEN_LOOP_SETTING} does not"
-            )
+            allowed = f"{missing}; the controller needs force closure, {_OPEN_LOOP_SETTING} does not"
+            raise problem("finger.tendons", allowed)
         tautness = self._tautness(routing)
         if not tautness.holds:
             raise problem("finger.tendons", f"{missing}, and {tautness}; {_OPEN_LOOP_SETTING} can do without")
@@ -274,13 +277,9 @@ class Scenario(Description):
     @property
     def numbers(self) -> dict[str, Array]:
         """Numbers of the controller as arrays of one per joint, tendon or passive tendon, by entry."""
-        joints, settings = len(self.finger.joints), self.controller
-        return {
-            "gain": expand(settings.gain, joints),
-            "damping": expand(settings.damping, joints),
-            "minimum_tension": expand(settings.minimum_tension, len(self.finger.tendons)),
-            "passive_tension": expand(settings.passive_tension, len(self.finger.passive_names)),
-        }
+        joints, tendons, passive = len(self.finger.joints), len(self.finger.tendons), len(self.finger.passive_names)
+        sizes = {"gain": joints, "damping": joints, "minimum_tension": tendons, "passive_tension": passive}
+        return {entry: expand(getattr(self.controller, entry), size) for entry, size in sizes.items()}
 
     def coupling(self, routing: Routing) -> PassiveCoupling:
         """Return the constraint of the passive tendons on the references (20)."""
@@ -292,7 +291,8 @@ class Scenario(Description):
             for name, finger in fingers.items()
         ]
         # In open loop nothing follows a reference.
-        needed, stiffness = self.controller.kind != "tensions", self.finger.numbers["passive_tendon"]["stiffness"]
+        needed = self.controller.kind != "tensions"
+        stiffness = expand(self.finger.passive_tendon.stiffness, len(self.finger.passive_names))
         return PassiveCoupling.from_routing(routing, np.concatenate(wishes), stiffness, needed=needed)
 
     def sample_times(self) -> Array:

@@ -5,7 +5,7 @@ Angles of joints, tensions of tendons and the force at the fingertip are all des
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, field_serializer, field_validator, model_validator
@@ -37,11 +37,12 @@ _ENTRIES_OF_KIND: dict[str, tuple[str, ...]] = {
     "hold": ("times", "values"),
 }
 _ANGLE = real(-MOST_ANGLE, MOST_ANGLE, hint=IN_RADIANS)
-_FORCE = real(-_MOST_FORCE, _MOST_FORCE)
+_FORCE, _FORCES = real(-_MOST_FORCE, _MOST_FORCE), series(-_MOST_FORCE, _MOST_FORCE)
 _MOST_TURN, _MOST_WOUND, _MILLIMETRES = 1e6, 1.0, " m (is it in millimetres?)"
 _TURN, _WOUND = real(-_MOST_TURN, _MOST_TURN), real(-_MOST_WOUND, _MOST_WOUND, hint=_MILLIMETRES)
 _MOST_VOLTAGE = 1e4
 _VOLTAGE = real(-_MOST_VOLTAGE, _MOST_VOLTAGE)
+Samples = tuple[float, ...] | Series
 
 
 class SignalSettings(Description):
@@ -70,13 +71,13 @@ class SignalSettings(Description):
     duration: Annotated[float, real(1e-6, _LATEST_TIME)] | None = quantity(
         None, unit="s", source="chosen", doc="Time that the ramp takes."
     )
-    times: Annotated[tuple[float, ...] | Series, series(-_LATEST_TIME, _LATEST_TIME)] | None = quantity(
+    times: Annotated[Samples, series(-_LATEST_TIME, _LATEST_TIME)] | None = quantity(
         None, unit="s", source="chosen", doc="Of the points or samples, increasing."
     )
     offset: float
     amplitude: float
     height: float | None
-    values: tuple[float, ...] | Series | None
+    values: Samples | None
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
@@ -126,94 +127,72 @@ class SignalSettings(Description):
         return self.offset - abs(self.amplitude) + float(np.min(self.values or (0.0, self.height or 0.0)))
 
 
+_DOCUMENTS = {
+    "offset": "Added to all of it; the mean of a sinusoid.",
+    "amplitude": "Amplitude of the sinusoid, half its swing.",
+    "height": "Of the step or ramp.",
+    "values": "At the points or samples.",
+}
+
+
+def signal_field(entry: str, unit: str, doc: str = "") -> Any:
+    """Return the field of a signal that has its unit: offset, amplitude, height or values."""
+    default = 0.0 if entry in ("offset", "amplitude") else None
+    return quantity(default, unit=unit, source="chosen", doc=doc or _DOCUMENTS[entry])
+
+
 class JointReference(SignalSettings):
     """theta^d of a joint."""
 
-    offset: Annotated[float, _ANGLE] = quantity(
-        0.0, unit="rad", source="chosen", doc="Added to all of it; the mean of a sinusoid."
-    )
-    amplitude: Annotated[float, _ANGLE] = quantity(
-        0.0, unit="rad", source="chosen", doc="Amplitude of the sinusoid, half its swing."
-    )
-    height: Annotated[float, _ANGLE] | None = quantity(None, unit="rad", source="chosen", doc="Of the step or ramp.")
-    values: Annotated[tuple[float, ...] | Series, series(-MOST_ANGLE, MOST_ANGLE, IN_RADIANS)] | None = quantity(
-        None, unit="rad", source="chosen", doc="At the points or samples."
-    )
+    offset: Annotated[float, _ANGLE] = signal_field("offset", "rad")
+    amplitude: Annotated[float, _ANGLE] = signal_field("amplitude", "rad")
+    height: Annotated[float, _ANGLE] | None = signal_field("height", "rad")
+    values: Annotated[Samples, series(-MOST_ANGLE, MOST_ANGLE, IN_RADIANS)] | None = signal_field("values", "rad")
 
 
 class InputSignal(SignalSettings):
     """Input of an actuator of a tree, in the unit that its gain takes."""
 
-    offset: Annotated[float, _FORCE] = quantity(
-        0.0, unit="1", source="chosen", doc="Added to all of it; the mean of a sinusoid."
-    )
-    amplitude: Annotated[float, _FORCE] = quantity(
-        0.0, unit="1", source="chosen", doc="Amplitude of the sinusoid, half its swing."
-    )
-    height: Annotated[float, _FORCE] | None = quantity(None, unit="1", source="chosen", doc="Of the step or ramp.")
-    values: Annotated[tuple[float, ...] | Series, series(-_MOST_FORCE, _MOST_FORCE)] | None = quantity(
-        None, unit="1", source="chosen", doc="At the points or samples."
-    )
+    offset: Annotated[float, _FORCE] = signal_field("offset", "1")
+    amplitude: Annotated[float, _FORCE] = signal_field("amplitude", "1")
+    height: Annotated[float, _FORCE] | None = signal_field("height", "1")
+    values: Annotated[Samples, _FORCES] | None = signal_field("values", "1")
 
 
 class SpoolAngle(SignalSettings):
     """Angle of the spool of a motor in position drive."""
 
-    offset: Annotated[float, _TURN] = quantity(
-        0.0, unit="rad", source="chosen", doc="Added to all of it; the mean of a sinusoid."
-    )
-    amplitude: Annotated[float, _TURN] = quantity(
-        0.0, unit="rad", source="chosen", doc="Amplitude of the sinusoid, half its swing."
-    )
-    height: Annotated[float, _TURN] | None = quantity(None, unit="rad", source="chosen", doc="Of the step or ramp.")
-    values: Annotated[tuple[float, ...] | Series, series(-_MOST_TURN, _MOST_TURN)] | None = quantity(
-        None, unit="rad", source="chosen", doc="At the points or samples."
-    )
+    offset: Annotated[float, _TURN] = signal_field("offset", "rad")
+    amplitude: Annotated[float, _TURN] = signal_field("amplitude", "rad")
+    height: Annotated[float, _TURN] | None = signal_field("height", "rad")
+    values: Annotated[Samples, series(-_MOST_TURN, _MOST_TURN)] | None = signal_field("values", "rad")
 
 
 class WoundLength(SignalSettings):
     """Length of a tendon that is wound in, from where it is just taut with all joints at zero."""
 
-    offset: Annotated[float, _WOUND] = quantity(
-        0.0, unit="m", source="chosen", doc="Added to all of it; the mean of a sinusoid."
-    )
-    amplitude: Annotated[float, _WOUND] = quantity(
-        0.0, unit="m", source="chosen", doc="Amplitude of the sinusoid, half its swing."
-    )
-    height: Annotated[float, _WOUND] | None = quantity(None, unit="m", source="chosen", doc="Of the step or ramp.")
-    values: Annotated[tuple[float, ...] | Series, series(-_MOST_WOUND, _MOST_WOUND, _MILLIMETRES)] | None = quantity(
-        None, unit="m", source="chosen", doc="At the points or samples."
-    )
+    offset: Annotated[float, _WOUND] = signal_field("offset", "m")
+    amplitude: Annotated[float, _WOUND] = signal_field("amplitude", "m")
+    height: Annotated[float, _WOUND] | None = signal_field("height", "m")
+    values: Annotated[Samples, series(-_MOST_WOUND, _MOST_WOUND, _MILLIMETRES)] | None = signal_field("values", "m")
 
 
 class VoltageSignal(SignalSettings):
     """Voltage of a motor in place of its loop; of pulse widths the mean, their part of the supply."""
 
-    offset: Annotated[float, _VOLTAGE] = quantity(
-        0.0, unit="V", source="chosen", doc="Added to all of it; the mean of a sinusoid."
-    )
-    amplitude: Annotated[float, _VOLTAGE] = quantity(
-        0.0, unit="V", source="chosen", doc="Amplitude of the sinusoid, half its swing."
-    )
-    height: Annotated[float, _VOLTAGE] | None = quantity(None, unit="V", source="chosen", doc="Of the step or ramp.")
-    values: Annotated[tuple[float, ...] | Series, series(-_MOST_VOLTAGE, _MOST_VOLTAGE)] | None = quantity(
-        None, unit="V", source="chosen", doc="At the points or samples."
-    )
+    offset: Annotated[float, _VOLTAGE] = signal_field("offset", "V")
+    amplitude: Annotated[float, _VOLTAGE] = signal_field("amplitude", "V")
+    height: Annotated[float, _VOLTAGE] | None = signal_field("height", "V")
+    values: Annotated[Samples, series(-_MOST_VOLTAGE, _MOST_VOLTAGE)] | None = signal_field("values", "V")
 
 
 class ForceSignal(SignalSettings):
     """Tension of a tendon, or a component of a force."""
 
-    offset: Annotated[float, _FORCE] = quantity(
-        0.0, unit="N", source="chosen", doc="Added to all of it; the mean of a sinusoid."
-    )
-    amplitude: Annotated[float, _FORCE] = quantity(
-        0.0, unit="N", source="chosen", doc="Amplitude of the sinusoid, half its swing."
-    )
-    height: Annotated[float, _FORCE] | None = quantity(None, unit="N", source="chosen", doc="Of the step or ramp.")
-    values: Annotated[tuple[float, ...] | Series, series(-_MOST_FORCE, _MOST_FORCE)] | None = quantity(
-        None, unit="N", source="chosen", doc="At the points or samples."
-    )
+    offset: Annotated[float, _FORCE] = signal_field("offset", "N")
+    amplitude: Annotated[float, _FORCE] = signal_field("amplitude", "N")
+    height: Annotated[float, _FORCE] | None = signal_field("height", "N")
+    values: Annotated[Samples, _FORCES] | None = signal_field("values", "N")
 
 
 def check_axes(signals: dict[str, ForceSignal] | None) -> dict[str, ForceSignal] | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import copy
 import math
 import re
 import tomllib
@@ -46,13 +45,9 @@ def shipped_texts(kind: str) -> dict[str, str]:
     return {name.removesuffix(".toml"): texts[name] for name in sorted(texts)}
 
 
-def shipped_table(kind: str, name: str) -> Table:
-    """Return the table of a kind and name that ships, which may be changed."""
-    return copy.deepcopy(_parsed(kind, name))
-
-
 @cache
-def _parsed(kind: str, name: str) -> Table:
+def shipped_table(kind: str, name: str) -> Table:
+    """Return the table of a kind and name that ships."""
     return tomllib.loads(shipped_texts(kind)[name])
 
 
@@ -116,8 +111,10 @@ def settings_of_finger(settings: _Settings, finger: str) -> _Settings:
 
     A table of another ``kind`` replaces, rather than completes.
     """
-    shared = settings.updated(fingers=None)
-    top: _Settings | None = (getattr(settings, "fingers") or {}).get(finger)  # noqa: B009
+    by_finger: dict[str, _Settings] | None = getattr(settings, "fingers")  # noqa: B009
+    if by_finger is None:
+        return settings
+    shared, top = settings.updated(fingers=None), by_finger.get(finger)
     if top is None:
         return shared
     if "kind" in top.model_fields_set and getattr(top, "kind", None) != getattr(shared, "kind", None):
@@ -148,8 +145,8 @@ def match_paths(pattern: Sequence[str], table: Any, above: tuple[str, ...] = ())
     Raises:
         InputError: If there is nothing that a star could stand for.
     """
-    if not pattern:
-        yield above
+    if "*" not in pattern and "{" not in "".join(pattern):
+        yield (*above, *pattern)
         return
     part, *rest = pattern
     names = [*as_table(table)] if part == "*" else part.strip("{}").split(",") if part.startswith("{") else [part]

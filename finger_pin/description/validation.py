@@ -59,7 +59,8 @@ class Description(BaseModel):
 
     def set_entries(self) -> dict[str, Any]:
         """Return the entries that were set, as in tables; nested descriptions stay objects."""
-        return nested({key: getattr(self, key) for key in self.model_fields_set})
+        entries = ((key, getattr(self, key)) for key in self.model_fields_set)
+        return {key: nested(value) if isinstance(value, dict) else value for key, value in entries}
 
 
 def as_table(value: Any) -> Table:
@@ -124,13 +125,14 @@ def reals(
 def vector(size: int, low: float = -math.inf, high: float = math.inf, hint: str = "") -> BeforeValidator:
     """Return a validator for a list of ``size`` finite numbers in [low, high]."""
     check = checker(low, high, False, hint)
+    return BeforeValidator(lambda value: _checked(value, size, check))
 
-    def validate(value: Any) -> tuple[float, ...]:
-        if not isinstance(value, list | tuple) or len(value) != size:
-            raise problem("", f"must be a list of {size} numbers", value)
-        return tuple(check(item, f"[{index}]") for index, item in enumerate(value))
 
-    return BeforeValidator(validate)
+def _checked(value: Any, size: int, check: Callable[[Any, str], float]) -> tuple[float, ...]:
+    """Return a list of so many numbers, each checked."""
+    if not isinstance(value, list | tuple) or len(value) != size:
+        raise problem("", f"must be a list of {size} numbers", value)
+    return tuple(check(item, f"[{index}]") for index, item in enumerate(value))
 
 
 def direction(size: int) -> BeforeValidator:
@@ -139,14 +141,12 @@ def direction(size: int) -> BeforeValidator:
     expected = "a quaternion x, y, z, w of length 1" if size == 4 else "a unit vector"
 
     def validate(value: Any) -> tuple[float, ...]:
-        if not isinstance(value, list | tuple) or len(value) != size:
-            raise problem("", f"must be a list of {size} numbers", value)
-        numbers = [check(item, f"[{index}]") for index, item in enumerate(value)]
+        numbers = _checked(value, size, check)
         length = math.hypot(*numbers)
         if abs(length - 1.0) > _UNIT - 1.0:
             raise problem("", f"must be {expected}", list(value))
         # What differs by rounding alone stays, to the bit.
-        return tuple(numbers if abs(length - 1.0) < 1e-15 else (number / length for number in numbers))
+        return numbers if abs(length - 1.0) < 1e-15 else tuple(number / length for number in numbers)
 
     return BeforeValidator(validate)
 
@@ -239,11 +239,8 @@ def _translate(model: type[BaseModel], error: ValidationError, prefix: tuple[str
         raise InputError(entry, context["allowed"], context["value"].content) from None
     if failure["type"] == "extra_forbidden":
         names = sorted(field_names(model, location[:-1]))
-        nearest_key = (
-            _OTHER_NAMES.get(location[-1], "")
-            if _OTHER_NAMES.get(location[-1]) in names
-            else nearest(location[-1], names)
-        )
+        other = _OTHER_NAMES.get(location[-1])
+        nearest_key = other if other in names else nearest(location[-1], names)
         hint = f"; did you mean {'.'.join([*prefix, *location[:-1], nearest_key])}?" if nearest_key else ""
         raise InputError(entry, f"unknown key; allowed here: {', '.join(names)}{hint}") from None
     if failure["type"] == "missing":

@@ -106,7 +106,7 @@ def shown(tmp_path_factory):
 
 
 def forget_what_ships():
-    for kept in (tables.shipped_texts, tables._parsed, loading._shipped_scenario):
+    for kept in (tables.shipped_texts, tables.shipped_table, loading._shipped_scenario):
         kept.cache_clear()
 
 

@@ -1,4 +1,7 @@
-"""References, tensions and forces over time in TOML and CSV: what they become, and what is wrong with them."""
+"""References, tensions and forces over time in TOML and CSV: what they become, and what is wrong with them.
+
+Whatever is read stays as it was.
+"""
 
 import tomllib
 
@@ -6,6 +9,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
+from finger_pin.description.loading import read_scenario
 from finger_pin.exceptions import InputError
 
 MOTION = "time,abduction,medial\n0.0,0.0,0.2\n0.5, 0.1, 0.3\n\n1.0,0.0,0.4\n"
@@ -220,3 +224,32 @@ def test_a_table_tells_the_times_names_units_and_delays_of_a_files_columns(tmp_p
 def test_slow_motions_are_taken_where_the_unit_says_so(tmp_path):
     motion = write(tmp_path, "motion.csv", "t (s),medial\n0,0.1\n500,0.2\n1000,0.3\n")
     assert fp.load_scenario("reversals", {"reference.file": str(motion)}).reference.joints["medial"].times[-1] == 1000.0
+
+
+def frozen(value):
+    """Return a table as text in which nothing of it is left out; a description is the same object."""
+    if isinstance(value, dict):
+        return {key: frozen(each) for key, each in value.items()}
+    return [frozen(each) for each in value] if isinstance(value, list) else repr(value)
+
+
+@pytest.mark.parametrize("base", ["hand", "servo_bench", "reversals"])
+def test_loading_changes_neither_the_table_nor_the_overrides_that_it_is_given(tmp_path, monkeypatch, base):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "motion.csv").write_text("time,medial\n0.0,0.2\n1.0,0.4\n")
+    table = tomllib.loads(fp.to_toml(fp.load_scenario(base)))
+    points = {"kind": "points", "times": [0.0, 1.0], "values": [0.0, 0.1]}
+    if base == "hand":
+        table["hand"]["fingers"] |= {"index": "ub_stand_in", "ring": {"finger": {"base": "ub_stand_in"}, "scale": 1.1}}
+        table["hand"]["palm"]["path"] = {"x": points, "y": points | {"times": "x"}}
+        overrides = {"hand.fingers": {"little": "ub_stand_in"}, "hand.fingers.*.finger.passive_tendon": {"mass": 1e-5}}
+    elif base == "servo_bench":
+        table["finger"]["actuators"]["M1"]["motor"] = "XL330-M288"
+        overrides = {"finger.actuators.*.motor": {"base": "XL330-M288"}, "finger.joint_friction.law": "coulomb"}
+    else:
+        table["reference"] = {"file": {"path": "motion.csv"}, "joints": {"medial": points}}
+        overrides = {"finger": {"base": "ub_stand_in"}}
+    given, shipped = frozen([table, overrides]), fp.to_toml(fp.load_scenario(base))
+    changed = read_scenario(table, overrides)
+    assert frozen([table, overrides]) == given
+    assert fp.to_toml(changed) != shipped == fp.to_toml(fp.load_scenario(base, {"name": base}))
