@@ -14,6 +14,6 @@ def loaded(browser):
         requests = [
             each["params"]["request"]["url"] for each in events if each["method"] == "Network.requestWillBeSent"
         ]
-        return [url for url in requests if not url.startswith(("data:", "about:", "blob:", "chrome:"))]
+        return [url for url in requests if not url.startswith(("data:", "about:", "blob:", "chrome"))]
 
     return urls
