@@ -99,7 +99,7 @@ class Cord(NamedTuple):
 
     @property
     def parts(self) -> tuple[Cord, ...]:
-        """What is before its first pulley, and then what is behind each."""
+        """The piece before its first pulley, and then that behind each."""
         return (self, *self.branches)
 
     @property
@@ -121,7 +121,7 @@ class Cord(NamedTuple):
 
     @property
     def sliding(self) -> Cord:
-        """What rubs: at bends, up to the last element that changes the length: what is beyond never slides."""
+        """The piece that rubs: at bends, up to the last element that changes the length, as none beyond slides."""
         last = max((number for number, each in enumerate(self.elements, 1) if each.moves), default=None)
         return self._replace(last=last) if self.at_bends else self
 

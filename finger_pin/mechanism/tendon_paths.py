@@ -22,7 +22,7 @@ from finger_pin.typing import Array
 
 
 class TendonPath(NamedTuple):
-    """What the rows of a tendon act along; its length is coefficients q + the lengths of the legs.
+    """Line along which the rows of a tendon act; its length is coefficients q + the lengths of the legs.
 
     Attributes:
         coefficients: Shape (n,).

@@ -61,7 +61,7 @@ class Objective(Generic[_Function]):
     """
 
     def __init__(self, function: _Function, stop: Callable[[], bool] = lambda: False) -> None:
-        """Remember nothing yet."""
+        """Start from a function of the parameters, without a best point."""
         self.function, self.stop, self.evaluations = function, stop, 0
         self.box, self.likelihood, self.feasible = function.box, function.likelihood, function.feasible
         self.exact, self.accuracy = function.exact, function.accuracy

@@ -42,7 +42,7 @@ class Search:
     """
 
     def __init__(self, objective: Objective[Any], checkpoint: Checkpoint, loss: str, progress: Progress | None) -> None:
-        """Find nothing yet; the loss is one of `LOSSES`."""
+        """Prepare a search; the loss is one of `LOSSES`."""
         self.objective, self.fits = objective, list[Fit]()
         self._checkpoint, self._loss = checkpoint, loss
         self._report = progress or (lambda words, done, total: None)
