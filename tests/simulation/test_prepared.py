@@ -130,6 +130,28 @@ def test_runs_in_several_threads_at_once_give_the_bits_of_one_after_the_other():
         assert np.array_equal(one["tendon_tension"], other["tendon_tension"])
 
 
+@pytest.mark.parametrize(
+    "key",
+    [
+        "finger.gravity[2]",
+        "finger.passive_tendon.mass",
+        "finger.tendons.T3.crossings.proximal.radius",
+        "finger.joints.medial.link.mass",
+        "finger.joints.distal.range[1]",
+        "controller.gain",
+    ],
+)
+def test_a_run_has_the_bits_of_the_first_one_whatever_ran_before(key):
+    scenario = fp.load_scenario("reversals", {"simulation.duration": 0.02, "finger.gravity": [0.0, 0.0, -9.81]})
+    names = ["joint_position", "tendon_tension", "joint_torque"]
+    several = fp.prepare(scenario, [key], names)
+    value = several.values[0]
+    for factor in (1.0, 1.1, 0.9, 1.0):
+        again, first = several.run([factor * value]), fp.prepare(scenario, [key], names).run([factor * value])
+        for name in names:
+            assert np.array_equal(again[name], first[name])
+
+
 def test_a_value_that_changes_the_structure_rebuilds_the_finger():
     motors = fp.prepare("servo", ["finger.actuators.*.motor", "simulation.duration"], ["motor_current"])
     other = {"finger.actuators.*.motor": "XC330-M288", "simulation.duration": 0.02}
