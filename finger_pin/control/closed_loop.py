@@ -154,8 +154,8 @@ class ClosedLoop:
 
     def compiled(self, reused: CompiledFinger | None = None) -> ClosedLoop:
         """Return the same loop on the compiled core, with one that is not needed any more if that fits."""
-        fitting = reused is not None and reused.rebind(self.finger)
-        return replace(self, dynamics=reused if reused is not None and fitting else CompiledFinger(self.finger))
+        fitting = reused if reused is not None and reused.rebind(self.finger) else CompiledFinger(self.finger)
+        return replace(self, dynamics=fitting)
 
     def initial_state(self) -> Array:
         """Return the packed state at the start, shape (size,)."""

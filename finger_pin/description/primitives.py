@@ -196,5 +196,5 @@ class Sized(Description):
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """What it is drawn with; nothing of a mesh or a half-space."""
+        """Parts that are drawn of it; none of a mesh or a half-space."""
         return KINDS[self.primitive].parts(self.sizes) if self.primitive in KINDS else ()

@@ -80,7 +80,7 @@ def _header(description: FingerDescription) -> str:
 
 
 class _Writer(BodyWriter):
-    """Writes bodies, tendons and what drives and holds them."""
+    """Writer of bodies, tendons, drives and constraints."""
 
     def __init__(self, description: FingerDescription, limits: bool, shapes: bool) -> None:
         super().__init__(description, limits, shapes)

@@ -148,7 +148,7 @@ def _model_warnings(residuals: Residuals) -> Iterator[str]:
 
 
 def _ringing(residuals: Residuals, z: Array) -> str:
-    """Return the first warning about what rings in the motions at a place of the search; empty without any."""
+    """Return the first warning about ringing in the motions at a place of the search; empty without any."""
     values = residuals.parameters.values(z)
     said = (model.ringing(*scenario_map(values)) for model, scenario_map in residuals.maps)
     return next(filter(None, said), "")

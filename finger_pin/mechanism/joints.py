@@ -57,12 +57,12 @@ class JointFriction:
         """The law."""
         return joint_law(self.description.joint_friction.law)
 
-    @property
+    @cached_property
     def bearing(self) -> NDArray[np.bool_]:
         """Whether each joint has a pin that rubs, shape (n,)."""
         return np.array(self.description.bearings)
 
-    @property
+    @cached_property
     def loads(self) -> Array:
         """Shape (n, s), one where a strand loads a joint."""
         return self.bearing[:, None] * self.routing.loads
@@ -188,34 +188,37 @@ class JointSprings:
 
     description: FingerDescription
 
-    def _numbers(self, name: str) -> Array:
-        joints = self.description.joints.values()
-        return np.array([getattr(joint.spring or _NO_SPRING, name) for joint in joints], dtype=float)
+    # Controllers ask for the torque at every sample.
+    @cached_property
+    def _numbers(self) -> dict[str, Array]:
+        springs = [joint.spring or _NO_SPRING for joint in self.description.joints.values()]
+        names = (*JOINT_SPRING.parameters, "hysteresis")
+        return {name: np.array([getattr(each, name) for each in springs], dtype=float) for name in names}
 
     @property
     def rest(self) -> Array:
         """theta_0, shape (n,), rad."""
-        return self._numbers("rest")
+        return self._numbers["rest"]
 
     @property
     def hysteresis(self) -> Array:
         """h, shape (n,)."""
-        return self._numbers("hysteresis")
+        return self._numbers["hysteresis"]
 
     @property
     def present(self) -> bool:
         """Return whether any joint has a spring that does something."""
-        return bool(np.any(self._numbers("stiffness")) or np.any(self._numbers("damping")))
+        return bool(np.any(self._numbers["stiffness"]) or np.any(self._numbers["damping"]))
 
     def torque(self, position: Array, velocity: Array) -> Array:
         """Return tau^k, shape (..., n), N m."""
-        stiffness, rest, damping = (self._numbers(name) for name in JOINT_SPRING.parameters)
+        stiffness, rest, damping = (self._numbers[name] for name in JOINT_SPRING.parameters)
         torque: Array = spring_torque(position, velocity, stiffness, rest, damping)
         return torque
 
     def rows(self, width: int) -> list[Rows]:
         """Return the table of the springs of joints that have one, and that of their hysteresis, if any has it."""
-        numbers, names = np.array([self._numbers(name) for name in JOINT_SPRING.parameters]), self.description.joints
+        numbers, names = np.array([self._numbers[name] for name in JOINT_SPRING.parameters]), self.description.joints
         sprung = np.flatnonzero((numbers[0] != 0.0) | (numbers[2] != 0.0))
         springs = Rows(
             group="joint_springs",

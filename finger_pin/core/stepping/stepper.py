@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,19 @@ from finger_pin.typing import Array
 Snapshot = list[tuple[bool, Drives | None, Array, tuple[Array, ...]]]
 
 TABLEAUS: dict[str, Callable[[], Tableau]] = {"Rodas5P": rodas5p, "Rodas4": rodas4}
+
+
+class StepperArgs(NamedTuple):
+    """Arguments of `Stepper`."""
+
+    mechanism: Mechanism
+    control: InputTable
+    x: Array
+    tableau: Tableau
+    rtol: float
+    atol: Array
+    force: Array | None = None
+    time: float = 0.0
 
 
 class Stepper:
@@ -69,7 +82,7 @@ class Stepper:
         self._charts, self._width = Charts.from_mechanism(mechanism), mechanism.coordinates
         self._structure, self._selected = structure, selections(structure, control)
         self._free = [np.isin(structure.charts, selection.island.coordinates) for selection in self._selected]
-        self._made_of = mechanism, control, x, tableau, rtol, atol, force, time
+        self._made_of = StepperArgs(mechanism, control, x, tableau, rtol, atol, force, time)
         self.mechanism, self.parts = mechanism, list[IslandIntegrator]()
         for selection, values in zip(self._selected, self._values_at_start(parameters), strict=True):
             memory = np.zeros(len(core.StepMemory._fields))
@@ -82,39 +95,25 @@ class Stepper:
                 IslandIntegrator(selection.island, followed, selection.structure, numbers, *start_arguments)
             )
 
-    def rebind(
-        self,
-        mechanism: Mechanism,
-        control: InputTable,
-        x: Array,
-        tableau: Tableau,
-        rtol: float,
-        atol: Array,
-        force: Array | None = None,
-        time: float = 0.0,
-        compiled: tuple[Structure, Parameters] | None = None,
-    ) -> bool:
-        """Start anew, bit for bit as a new stepper of these; return False, and be of no use, if more differs.
-
-        Its arguments are those of the constructor.
-        """
-        structure, parameters = compiled or compile_mechanism(mechanism)
-        same = structure is self._structure and selections(structure, control) is self._selected
-        if not same or tableau is not self._made_of[3] or rtol != self._made_of[4]:
+    def rebind(self, args: StepperArgs, compiled: tuple[Structure, Parameters] | None = None) -> bool:
+        """Start anew, bit for bit as a new stepper of these; return False, and be of no use, if more differs."""
+        structure, parameters = compiled or compile_mechanism(args.mechanism)
+        same = structure is self._structure and selections(structure, args.control) is self._selected
+        if not same or args.tableau is not self._made_of.tableau or args.rtol != self._made_of.rtol:
             return False
-        self.mechanism, self._made_of = mechanism, (mechanism, control, x, tableau, rtol, atol, force, time)
+        self.mechanism, self._made_of = args.mechanism, args
         values = self._values_at_start(parameters)
-        return all(part.rebind(each, time) for part, each in zip(self.parts, values, strict=True))
+        return all(part.rebind(each, args.time) for part, each in zip(self.parts, values, strict=True))
 
     def _values_at_start(self, parameters: Parameters) -> Iterator[StartValues]:
         """Yield the values of each island, not copied."""
-        mechanism, control, x, _, _, atol, force, _ = self._made_of
-        forces = np.zeros((len(mechanism.body.tips), 3))
-        forces[:] = 0.0 if force is None else force
-        start, attitude = self._charts.to_core(np.asarray(x, dtype=float))
-        tolerances = np.asarray(atol, dtype=float)[self._charts.packed_places(np.arange(self._charts.size))]
+        args = self._made_of
+        forces = np.zeros((len(args.mechanism.body.tips), 3))
+        forces[:] = 0.0 if args.force is None else args.force
+        start, attitude = self._charts.to_core(np.asarray(args.x, dtype=float))
+        tolerances = np.asarray(args.atol, dtype=float)[self._charts.packed_places(np.arange(self._charts.size))]
         for selection, free in zip(self._selected, self._free, strict=True):
-            inputs, pushed = selection.control(control), forces[selection.island.tips]
+            inputs, pushed = selection.control(args.control), forces[selection.island.tips]
             at = self._places(selection.island)
             # An island that nothing pushes computes as it does alone.
             loaded = bool(len(inputs.force.harmonics) or np.any(pushed))
@@ -148,11 +147,12 @@ class Stepper:
             reused: A stepper that is not needed any more: it is returned, if its finger differs in numbers only.
             evaluator: If it is one of the same mechanism, its structure and parameters are taken.
         """
-        given = finger.mechanism, control, x, TABLEAUS[method](), rtol, atol_scale * finger.layout.scales(), force, 0.0
+        atol = atol_scale * finger.layout.scales()
+        args = StepperArgs(finger.mechanism, control, x, TABLEAUS[method](), rtol, atol, force)
         compiled = None
         if isinstance(evaluator, CompiledFinger) and evaluator.finger is finger:
             compiled = evaluator.mechanism.structure, evaluator.mechanism.parameters
-        return reused if reused is not None and reused.rebind(*given, compiled) else cls(*given, compiled)
+        return reused if reused is not None and reused.rebind(args, compiled) else cls(*args, compiled)
 
     def _places(self, island: Island) -> NDArray[np.int64]:
         """Return the indices of an island's numbers in the whole state."""

@@ -117,7 +117,7 @@ def _lead_in(placement: pin.SE3, begin: Array, entry: float, length: float) -> A
 
 
 def _arc_fractions(turn: float, limits: tuple[float, float], resolution: int, last: bool) -> Array:
-    """Return where the points of an arc lie, from 0 to 1, shape (k,), as many as the joint's range needs."""
+    """Return the places of the points of an arc, from 0 to 1, shape (k,), as many as the joint's range needs."""
     widest = max(abs(turn + limit) for limit in limits)
     count = max(3, math.ceil(resolution * min(widest, 4.0 * math.pi)))
     return np.asarray(np.arange(1, count + 1) / (count if last else count + 1))
