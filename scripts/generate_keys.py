@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin
@@ -14,7 +14,6 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from finger_pin.commands.application import run_function
-from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.description.controller import ControllerSettings
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.loading import load_scenario
@@ -23,9 +22,10 @@ from finger_pin.description.recordings.bench import IdentifySettings
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.tables import list_scenarios
 from finger_pin.description.validation import Description
-from finger_pin.simulation.sampled_trajectory import Quantity
+from finger_pin.mechanism.signal_table import SECTIONS
+from finger_pin.mechanism.signals import Quantity
 from finger_pin.simulation.setup import Setup
-from finger_pin.simulation.variables import variables
+from finger_pin.simulation.variables import RUN_SECTIONS, variables
 
 PACKAGE = Path(__file__).resolve().parents[1] / "finger_pin"
 PAGE, VARIABLES = PACKAGE / "description" / "KEYS.md", PACKAGE / "simulation" / "VARIABLES.md"
@@ -147,30 +147,8 @@ whole result where nothing limits tensions. What stands last belongs to tables o
 input from the controller is `<table>_input`, and "SI" is the unit of what the variable is.
 Written by `python scripts/generate_keys.py`.
 """
-#: When variables exist: a loop has those whose condition it meets, and no others.
-CONDITIONS: dict[str, Callable[[ClosedLoop], object]] = {
-    "Always": lambda loop: True,
-    'With bristles in the joints, any law but `"coulomb"`': lambda loop: loop.finger.layout.names_of("joint_stiction"),
-    "With passive tendons": lambda loop: loop.finger.routing.passive,
-    "With hysteresis of passive or elastic tendons": lambda loop: loop.finger.layout.names_of("elastic_stiction"),
-    'With `tendon_friction.place = "bends"`, or paths that bend': lambda loop: loop.finger.wraps,
-    "With motors or winches": lambda loop: loop.finger.actuators.names or loop.finger.routing.winched.any(),
-    "With winches": lambda loop: loop.finger.routing.winched.any(),
-    "With motors": lambda loop: loop.finger.actuators.names,
-    "With play in gears": lambda loop: loop.finger.actuators.loose_names,
-    "With motors in position drive": lambda loop: loop.finger.actuators.holds.any(),
-    "With motors in position drive or winches": lambda loop: (
-        loop.finger.actuators.holds.any() or loop.finger.routing.winched.any()
-    ),
-    "With objects, or links that touch each other": lambda loop: loop.finger.scene,
-    "With free objects": lambda loop: loop.finger.scene and loop.finger.scene.free,
-    "With objects that are moved along paths": lambda loop: loop.prescribed_motion,
-    "With a palm that moves": lambda loop: loop.palm,
-    "With tendons of a tree that are springs": lambda loop: (
-        (tree := loop.finger.description.tree) and any(each.stiffness for each in tree.tendons.values())
-    ),
-    "With a sampled controller: what its sensors measure, after `measured_`": lambda loop: loop.controller.sensors,
-}
+_SENSORS = "With a sampled controller: what its sensors measure, after `measured_`"
+_ACCOUNT, _ROWS = "The energy account, of the parts that there are", "Of tables of rows"
 #: What shows each of them, besides the scenarios that ship.
 _FURTHER: tuple[tuple[str, dict[str, Any]], ...] = (
     ("fig6", {"finger.joint_friction": {"law": "coulomb"}}),
@@ -183,7 +161,7 @@ _FURTHER: tuple[tuple[str, dict[str, Any]], ...] = (
 
 
 def variables_page() -> str:
-    """Return the page: a table for each condition."""
+    """Return the page: a table for each section."""
     loops = [
         Setup.from_scenario(load_scenario(*each)).loop for each in (*((name,) for name in list_scenarios()), *_FURTHER)
     ]
@@ -191,30 +169,25 @@ def variables_page() -> str:
     for k, loop in enumerate(loops):
         tables = [table.group for table in loop.finger.extra_rows]
         for name, each in variables(loop).items():
-            group = next((group for group in tables if each.dims[1:] == (group,)), "")
+            group = next((group for group in tables if each.dims == (group,)), "")
             found.setdefault(name.replace(group, "<table>", 1) if group else name, {})[k, group] = each
-    met = {title: {k for k, loop in enumerate(loops) if holds(loop)} for title, holds in CONDITIONS.items()}
-    parts = {title: [] for title in met}
-    rows: list[str] = []
+    listed = (*SECTIONS, *RUN_SECTIONS)
+    parts: dict[str, list[str]] = {title: [] for title in (*(each.title for each in listed), _SENSORS, _ACCOUNT, _ROWS)}
+    for section in listed:
+        for name, each in section.signals.items():
+            parts[section.title].append(_variable_row(name, found.pop(name, {(0, ""): each})))
     for name, shown in found.items():
-        if name.startswith("<table>"):
-            rows.append(_variable_row(name, shown))
-        elif not name.startswith("energy_exchanged_"):
-            title = next((title for title, where in met.items() if where == {k for k, _ in shown}), None)
-            if title is None:
-                raise LookupError(f"{name}: no condition says when it exists")
+        title = _ROWS if name.startswith("<table>") else _SENSORS if name.startswith("measured_") else _ACCOUNT
+        if not name.startswith("energy_exchanged_"):
             parts[title].append(_variable_row(name, shown))
     head = "| name | unit | dimensions | meaning |\n|---|---|---|---|\n"
-    tables = [
-        f"## {title}\n\n{head}" + "\n".join(each) + "\n"
-        for title, each in (parts | {"Of tables of rows": rows}).items()
-    ]
+    tables = [f"## {title}\n\n{head}" + "\n".join(each) + "\n" for title, each in parts.items()]
     return "\n".join([VARIABLES_HEAD, *tables])
 
 
 def _variable_row(name: str, shown: dict[tuple[int, str], Quantity]) -> str:
     first = next(iter(shown.values()))
-    kinds = dict.fromkeys(", ".join(each.dims[1:]) for each in shown.values())
+    kinds = dict.fromkeys(", ".join(each.dims) for each in shown.values())
     dims = " or ".join(each or "none" for each in kinds) if len(kinds) > 1 else next(iter(kinds))
     units = " or ".join(dict.fromkeys(each.units for each in shown.values()))
     label, unit = f"`{name}`", "" if units == "1" else units

@@ -43,7 +43,7 @@ def rates(finger):
     """Rates and signals at a posture."""
     x = finger.rest_state(0.5 * (finger.stroke_limiter.lower + finger.stroke_limiter.upper))
     inputs = np.full(finger.mechanism.channels, 3.0)
-    return [*finger.rhs(0.0, x, inputs), *finger.evaluate(x, inputs).acceleration]
+    return [*finger.rhs(0.0, x, inputs), *finger.evaluate(x, inputs)["joint_acceleration"]]
 
 
 def simulator(name):
@@ -58,7 +58,11 @@ def simulator(name):
 def stepped(simulator):
     inputs = np.full(simulator.finger.mechanism.channels, 3.0)
     simulator.step(inputs, 1e-3)
-    found = [*simulator.x, *simulator.signals().acceleration, *simulator.result().joint_position.values.ravel()]
+    found = [
+        *simulator.x,
+        *simulator.signals()["joint_acceleration"],
+        *simulator.result().joint_position.values.ravel(),
+    ]
     simulator.reset()
     simulator.set_parameters({"finger.gravity": [0.0, 0.0, -5.0]})
     simulator.step(inputs, 1e-3)

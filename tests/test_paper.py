@@ -55,7 +55,7 @@ def test_tendon_friction_depends_on_the_posture(finger):
     """Conclusions, first point: bending the joints that bend T4's path raises its loss by the capstan law."""
 
     def coefficient(posture):
-        return finger.evaluate(finger.rest_state(posture), np.ones(4)).tendons.coefficient
+        return finger.evaluate(finger.rest_state(posture), np.ones(4))["tendon_friction_coefficient"]
 
     straight, bent = coefficient([0.0, 0.0, 0.0, 0.0]), coefficient([0.0, 1.5, 1.5, 0.0])
     turns = 0.51 + 3.0
@@ -69,7 +69,7 @@ def test_joint_friction_grows_with_the_sum_of_the_tensions(finger):
     """Conclusions, second point: (17), so that twice the tensions make twice the break-away torque."""
     x = finger.rest_state(np.array([0.0, 0.4, 0.5, 0.4]))
     tension = np.array([1.0, 2.0, 3.0, 4.0])
-    levels = [finger.evaluate(x, factor * tension).joints.level for factor in (1.0, 2.0, 10.0)]
+    levels = [finger.evaluate(x, factor * tension).rows["joint_friction"]["level"] for factor in (1.0, 2.0, 10.0)]
     np.testing.assert_allclose(levels[0], 3.5e-4 * np.array([10.0, 10.0, 7.0, 4.0]), rtol=1e-9)
     np.testing.assert_allclose(levels[1], 2.0 * levels[0], rtol=1e-9)
     np.testing.assert_allclose(levels[2], 10.0 * levels[0], rtol=1e-9)

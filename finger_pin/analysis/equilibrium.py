@@ -15,8 +15,8 @@ from finger_pin.exceptions import InputError
 from finger_pin.laws.muscle import active_work
 from finger_pin.mechanism.coerce import FingerLike, as_finger, as_inputs
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.groups import MUSCLES, SOURCES_WITH_END, STATEFUL, STATELESS, WINCHES
+from finger_pin.mechanism.signals import FingerSignals
 from finger_pin.typing import Array
 
 # Change of an angle for differences, rad.
@@ -101,7 +101,7 @@ def equilibrium(
     if not float(np.max(np.abs(problem.acceleration(y)))) < max(_REST_ACCELERATION, 1e-9 * initial_acceleration):
         raise InputError("inputs", "the finger comes to no rest under it", command.tolist())
     coordinates, x = problem.scale * y, problem.packed(y)
-    torque = finger.evaluate(x, command, tip_force).tendon_torque
+    torque = finger.evaluate(x, command, tip_force)["joint_torque"]
     return Equilibrium(coordinates[:joints], coordinates[joints:], np.asarray(torque), x)
 
 
@@ -163,12 +163,11 @@ class _Statics:
 
     def energy(self, y: Array) -> float:
         """Return the stored energy less the work of inputs and force, J."""
-        finger, joints, actuated = self.finger, len(self.finger.routing.joints), self.finger.routing.actuated
-        x = self.packed(y)
+        finger, joints, x = self.finger, len(self.finger.routing.joints), self.packed(y)
         theta, signals = finger.layout.unpack(x).position, finger.evaluate(x, self.command, self.tip_force)
         stored, _ = signals.mechanism.account()
         potential_energy = finger.motion(theta, np.zeros(joints)).potential_energy
-        work = (~finger.routing.winched * signals.tendons.entering[:actuated]) @ finger.excursion(theta)
+        work = (~finger.routing.winched * signals.rows["driven_tendons"].row.command) @ finger.excursion(theta)
         work -= _held_by_friction(signals)
         work += float(np.sum(self.tip_force * finger.rigid_body.tip_position(theta))) + _actuator_work(signals)
         return float(sum(stored.values()) + potential_energy - work)
@@ -211,8 +210,8 @@ def _check_can_rest(finger: Finger) -> None:
 
 def _held_by_friction(signals: FingerSignals) -> float:
     """Return the work of tendons' lengths against what the bristles of their canals hold, J."""
-    rows = [signals.tendons.driven, *(wraps for wraps, _ in signals.tendons.beyond)]
-    return float(sum(table["friction"] @ table.row.length for table in rows))
+    tables = (signals.rows[group] for group in ("driven_tendons", *signals.finger.wraps))
+    return float(sum(rows["friction"] @ rows.row.length for rows in tables))
 
 
 def _actuator_work(signals: FingerSignals) -> float:

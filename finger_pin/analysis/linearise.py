@@ -200,13 +200,13 @@ def _slope(values: Array, rounding: Array, h: float) -> tuple[Array, int | None]
 
 def _rates_and_outputs(compiled: CompiledFinger, x: Array, u: Array) -> Array:
     """Return rates and outputs at packed states under inputs, shape (m, n + outputs)."""
-    signals, routing = compiled.evaluate(x, u), compiled.finger.routing
-    state, strands = signals.state, signals.tendons.strands
+    signals = compiled.evaluate(x, u)
+    state = signals.state
     tip = compiled.motion(state.position, state.velocity).tip.reshape(len(x), -1)
-    current = signals.motors.current if signals.motors is not None else np.zeros((len(x), 0))
-    # Of a passive tendon, the distal half.
-    tensions = strands[:, : routing.actuated], strands[:, routing.actuated + 1 :: 2]
-    return np.concatenate([signals.rate, state.position, state.velocity, *tensions, tip, current], axis=1)
+    current = [signals["motor_current"]] if compiled.finger.actuators.names else []
+    return np.concatenate(
+        [signals.rate, state.position, state.velocity, signals["tendon_tension"], tip, *current], axis=1
+    )
 
 
 def _output_names(finger: Finger, count: int) -> list[str]:

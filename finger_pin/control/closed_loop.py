@@ -24,7 +24,7 @@ from finger_pin.description.signals import AXES, ForceSignal
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.evaluation import Outputs
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_signals import FingerSignals
+from finger_pin.mechanism.signals import FingerSignals
 from finger_pin.mechanism.state import Motion, State, as_floats
 from finger_pin.references.reference import LoopReference, Reference, ReferenceSignals
 from finger_pin.references.signal import HARMONIC, Signal

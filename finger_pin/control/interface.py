@@ -14,7 +14,7 @@ from finger_pin.description.caching import cached_property
 from finger_pin.description.routing import Routing
 from finger_pin.mechanism.evaluation import Outputs
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_signals import FingerSignals
+from finger_pin.mechanism.signals import FingerSignals
 from finger_pin.mechanism.state import Motion, State
 from finger_pin.references.reference import LoopReference, ReferenceSignals
 from finger_pin.references.signal import Signal

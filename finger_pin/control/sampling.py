@@ -89,7 +89,7 @@ class TensionSensor(SampledSensor):
 
     def read(self, now: Instant) -> Array:
         """Return f, shape (t,)."""
-        delivered = now.loop.finger.routing.tendon_tension(now.signals.tendons.strands)
+        delivered = now.signals["tendon_tension"]
         return delivered + self._noise * self._random.standard_normal(len(delivered))
 
 

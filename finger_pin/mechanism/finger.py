@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from finger_pin.description.caching import cached_property
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.assembly import ConstructorArgs, Parts, assemble, check_joints
 from finger_pin.mechanism.evaluation import Evaluation, Outputs, check_outputs
-from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.from_pinocchio import on_model
 from finger_pin.mechanism.groups import CANALS
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows
+from finger_pin.mechanism.signal_table import finger_signals
+from finger_pin.mechanism.signals import FingerSignals, Quantity
 from finger_pin.mechanism.state import Motion, as_floats
 from finger_pin.mechanism.tendon_paths import Excursions
 from finger_pin.mechanism.tree_mechanism import build_body
@@ -230,8 +233,16 @@ class Finger:
     def signals(self, x: Array, inputs: Array, fingertip_force: Array | None, evaluation: Evaluation) -> FingerSignals:
         """Return an evaluation of the mechanism by the names of the paper."""
         force = np.zeros(3) if fingertip_force is None else np.asarray(fingertip_force, dtype=float)
-        state, bodies = self.layout.unpack(x), int(self.mechanism.body.model.nv)
-        return FingerSignals(state, inputs, force, evaluation, bodies, self.drive_matrices, self.wraps)
+        return FingerSignals(self, self.layout.unpack(x), inputs, force, evaluation)
+
+    @cached_property
+    def signal_table(self) -> dict[str, Quantity]:
+        """Its signals by name, which are variables of its results."""
+        return finger_signals(self)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return all but the functions of its signals, which cannot be pickled."""
+        return {name: value for name, value in vars(self).items() if name != "signal_table"}
 
     @property
     def wrap_names(self) -> tuple[str, ...]:

@@ -226,6 +226,11 @@ class Scene:
         return points
 
 
+def rotate(quaternion: Array, vector: Array) -> Array:
+    """Turn vectors by unit quaternions x, y, z, w, shapes (..., 3) and (..., 4)."""
+    return _turned(vector, quaternion[..., :3], quaternion[..., 3:])
+
+
 def _turned(vector: Array, axis: Array, scalar: Array) -> Array:
     """Return vectors turned by unit quaternions of a vector and a scalar part, shapes (..., 3), (..., 3), (..., 1)."""
     vector = np.broadcast_to(vector, axis.shape)

@@ -233,6 +233,12 @@ class RowSignals:
         """Return a signal of the law by its name."""
         return self.signals[self.rows.signal(name)]
 
+    def field(self, name: str) -> Array:
+        """Return a signal of the law, "force", "rate", or an argument of the law by its name."""
+        if name in self.rows.law.signals:
+            return self[name]
+        return np.asarray(getattr(self if name in ("force", "rate") else self.row, name))
+
     def account(self) -> tuple[Array, dict[str, Array]]:
         """Return the stored energy of all rows together, J, and their powers by the names of the table, W."""
         rows = self.rows

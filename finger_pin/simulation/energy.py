@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.core.steps.trajectory import Trajectory
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.rows import SUPPLIED, Energies, Energy
+from finger_pin.mechanism.signals import FingerSignals
 from finger_pin.mechanism.state import Kinematics, Motion
 from finger_pin.typing import Array
 
@@ -113,7 +113,9 @@ def powers(signals: FingerSignals) -> Flows:
         rows = evaluation.energy_terms[..., len(evaluation.energies.stored) :]
     else:
         rows = np.stack(list(evaluation.account()[1].values()), axis=-1)
-    return Flows.from_rows(evaluation.energies, rows, np.sum(signals.external_torque * signals.state.velocity, axis=-1))
+    return Flows.from_rows(
+        evaluation.energies, rows, np.sum(signals["external_torque"] * signals.state.velocity, axis=-1)
+    )
 
 
 def account_entries(result: xr.Dataset, *kinds: str) -> dict[str, xr.Variable]:

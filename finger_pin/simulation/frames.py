@@ -16,7 +16,7 @@ from finger_pin.description.objects import Object
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import Description, validate
 from finger_pin.exceptions import InputError
-from finger_pin.simulation.sampled_trajectory import BASE_FRAME, WORLD_FRAME
+from finger_pin.mechanism.signals import BASE_FRAME, WORLD_FRAME
 from finger_pin.typing import Array
 
 

@@ -19,7 +19,7 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.state import BLOCKS, State
 from finger_pin.simulation.contact_variables import last_contact_state
 from finger_pin.simulation.netcdf import require_samples
-from finger_pin.simulation.row_variables import LOOP_VARIABLES
+from finger_pin.simulation.variables import LOOP_VARIABLES
 from finger_pin.typing import Array
 
 # The rows that guard ranges: what they guard, and the unit of its depth.

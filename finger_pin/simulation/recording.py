@@ -18,8 +18,9 @@ from finger_pin.description.simulation_settings import SimulationSettings
 from finger_pin.description.validation import choices
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.signals import BASE_FRAME
 from finger_pin.simulation.frames import scene_metadata
-from finger_pin.simulation.sampled_trajectory import BASE_FRAME, SampledTrajectory
+from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.simulation.variables import SHORTFALL, coordinates, variables
 from finger_pin.threads import physical_memory
 from finger_pin.typing import Array
@@ -42,12 +43,15 @@ def record_arrays(samples: SampledTrajectory, names: Sequence[str] | None = None
     check_variables(entry, names or (), table)
     if names is None and samples.control.torque_deficit is None:
         del table[SHORTFALL]
-    quantities = table if names is None else {name: table[name] for name in names}
+    recorded = table if names is None else {name: table[name] for name in names}
     # Energies of a diverging motion may overflow; the motion itself is checked elsewhere.
     # A few variables are copied, so that the arrays they are views of are freed.
     convert = np.asarray if names is None else np.array
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return {name: (each.dims, convert(each.value(samples)), each.attributes) for name, each in quantities.items()}
+        return {
+            name: (("time", *each.dims), convert(samples.values_of(each)), each.attributes)
+            for name, each in recorded.items()
+        }
 
 
 def select(result: xr.Dataset, names: Iterable[str]) -> xr.Dataset:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -11,16 +10,12 @@ from finger_pin.control.closed_loop import ClosedLoop, LoopSignals
 from finger_pin.control.interface import ControlSignals
 from finger_pin.core.steps.trajectory import Trajectory
 from finger_pin.description.caching import cached_property
-from finger_pin.mechanism.evaluation import ContactPoints, Outputs
-from finger_pin.mechanism.finger_signals import FingerSignals
-from finger_pin.mechanism.rows import Energy
-from finger_pin.mechanism.state import BLOCKS, Motion, State
+from finger_pin.mechanism.evaluation import Outputs
+from finger_pin.mechanism.signals import FingerSignals, Quantity
+from finger_pin.mechanism.state import Motion, State
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.simulation.energy import Account, Flows, account, energies, powers
 from finger_pin.typing import Array
-
-#: Frames of variables with components; the base's, a palm's if there is one, is that of all but the palm's own.
-BASE_FRAME, WORLD_FRAME = "base", "world"
 
 #: Variables that need states, plans and no more of the finger's signals than forces.
 _FORCE_VARIABLES = frozenset(
@@ -111,12 +106,9 @@ class SampledTrajectory:
         """Return the lengths that spools at angles (m, k), rad, wind in of their k' cords, shape (m, k'), m."""
         return angle @ self.loop.finger.actuators.spools.T
 
-    @cached_property
-    def touching(self) -> ContactPoints:
-        """Contacts in space."""
-        scene, mechanism = self.loop.finger.scene, self.finger.mechanism
-        assert scene is not None
-        return mechanism.touching or scene.touching(self.state, mechanism.rows[scene.contacts.group].force)
+    def values_of(self, variable: Quantity) -> Array:
+        """Return the values of a variable, shape (m, ...)."""
+        return variable.value(self.finger if variable.of_finger else self)
 
     @cached_property
     def motion(self) -> Motion:
@@ -137,46 +129,3 @@ class SampledTrajectory:
     def account(self) -> Account:
         """The energy account."""
         return account(self.loop, self.trajectory, self.times, self.signals, self.motion)
-
-
-class Quantity(NamedTuple):
-    """A variable of a result.
-
-    Attributes:
-        dims: Names of its dimensions, time first.
-        value: Function that returns its values from a sampled trajectory.
-        units: SI.
-        long_name: In words.
-        equation: Number of its equation in the paper; empty for none.
-        frame: Whose axes its components are along, `BASE_FRAME` or `WORLD_FRAME`; empty for what has none.
-        energy_term: Its part in the energy account, if any.
-    """
-
-    dims: tuple[str, ...]
-    value: Callable[[SampledTrajectory], Array]
-    units: str
-    long_name: str
-    equation: str = ""
-    frame: str = ""
-    energy_term: Energy | None = None
-
-    @property
-    def attributes(self) -> dict[str, str]:
-        """Unit, name, frame and equation, and its part in the account."""
-        metadata = {"units": self.units, "long_name": self.long_name} | ({"frame": self.frame} if self.frame else {})
-        if self.energy_term is not None:
-            metadata |= {"account": self.energy_term.kind, "label": self.energy_term.label}
-        return metadata | {"equation": f"({self.equation})"} if self.equation else metadata
-
-
-def state_block(block: str, single: bool = False) -> Quantity:
-    """Return the variable of a block of the state; without a second dimension if ``single``."""
-    entry = BLOCKS[block]
-
-    def value(samples: SampledTrajectory) -> Array:
-        values: Array = getattr(samples.state, block)
-        return values[:, 0] if single else values
-
-    return Quantity(
-        ("time",) if single else ("time", entry.dimension), value, entry.unit, entry.long_name, entry.equation
-    )

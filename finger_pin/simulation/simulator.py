@@ -22,7 +22,7 @@ from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.mechanism.coerce import FingerLike, as_finger, resolve_finger, with_finger, with_parameters_of
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_signals import FingerSignals
+from finger_pin.mechanism.signals import FingerSignals
 from finger_pin.mechanism.state import State
 from finger_pin.references.reference import Reference
 from finger_pin.simulation.held_inputs import HeldInputs

@@ -19,14 +19,14 @@ from finger_pin.core.stepping.batch_stepper import advance_many
 from finger_pin.core.steps.trajectory import Statistics, Trajectory
 from finger_pin.description.caching import cached_property
 from finger_pin.exceptions import InputError
+from finger_pin.mechanism.signals import Quantity
 from finger_pin.mechanism.state import Motion, State
 from finger_pin.references.reference import ReferenceSignals
 from finger_pin.references.signal import Signal
 from finger_pin.simulation.recording import check_variables, record
-from finger_pin.simulation.row_variables import LOOP_VARIABLES, RESIDUAL
-from finger_pin.simulation.sampled_trajectory import Quantity, SampledTrajectory
+from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.simulation.simulator import Simulator
-from finger_pin.simulation.variables import variables
+from finger_pin.simulation.variables import LOOP_VARIABLES, RESIDUAL, variables
 from finger_pin.typing import Array
 
 # Of a reference and a controller, which do not act.
@@ -105,10 +105,10 @@ def advance(
 def instant_variables(loop: ClosedLoop) -> dict[str, Quantity]:
     """Return the variables of a result that are defined at an instant, by name."""
     return {
-        name: quantity
-        for name, quantity in variables(loop).items()
+        name: each
+        for name, each in variables(loop).items()
         # The account is of a whole run.
-        if quantity.energy_term is None and name not in (*_CONTROLLER_VARIABLES, *LOOP_VARIABLES, RESIDUAL)
+        if each.energy_term is None and name not in (*_CONTROLLER_VARIABLES, *LOOP_VARIABLES, RESIDUAL)
     }
 
 
@@ -154,7 +154,7 @@ class Instants(SampledTrajectory):
     def read(self, names: Sequence[str] | None = None) -> dict[str, Array]:
         """Return variables now by name, shape (simulators, ...); by default all of this object's."""
         self.update()
-        return {name: np.array(self._quantities[name].value(self)) for name in names or self._quantities}
+        return {name: np.array(self.values_of(self._quantities[name])) for name in names or self._quantities}
 
     def dataset(self) -> xr.Dataset:
         """Return the variables as a Dataset with the simulators along time: of one simulator its present instant."""

@@ -1,9 +1,9 @@
-"""The variables that a result can have, each with its unit, name and equation, computed when it is asked for."""
+"""The variables that a result can have: signals of its finger, references, commands, and the energy account."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -12,169 +12,25 @@ import pinocchio as pin
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.palm import PrescribedJoints
 from finger_pin.description.scenario import Scenario
-from finger_pin.mechanism.rows import RowSignals
-from finger_pin.simulation.contact_variables import contact_coordinates, contact_value, contact_variables
-from finger_pin.simulation.row_variables import account_variables, cord_variables, extra_row_variables, motor_variables
-from finger_pin.simulation.sampled_trajectory import BASE_FRAME, WORLD_FRAME, Quantity, SampledTrajectory, state_block
+from finger_pin.mechanism.rows import LOST
+from finger_pin.mechanism.signal_table import ALWAYS
+from finger_pin.mechanism.signals import WORLD_FRAME, Quantity, Section
+from finger_pin.simulation.contact_variables import contact_coordinates
+from finger_pin.simulation.energy import flow_terms, stored_terms
+from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.typing import Array
 
-_JOINT, _TENDON, _PASSIVE = ("time", "joint"), ("time", "tendon"), ("time", "passive_tendon")
-_MOTORS, _TIME = ("time", "motor"), ("time",)
 #: A variable that is left out of a whole result where nothing limits tensions.
 SHORTFALL = "torque_shortfall"
-
-
-def variables(loop: ClosedLoop) -> dict[str, Quantity]:
-    """Return all variables that a result of a loop can have, by name."""
-    table = {
-        "joint_position": state_block("position"),
-        "joint_velocity": state_block("velocity"),
-        "joint_acceleration": Quantity(
-            _JOINT, lambda run: run.finger.acceleration, "rad/s2", "joint acceleration", "18"
-        ),
-        "joint_reference": Quantity(_JOINT, lambda run: run.reference.position, "rad", "desired joint angle", "20"),
-        "tracking_error": Quantity(
-            _JOINT, lambda run: run.reference.position - run.state.position, "rad", "desired less actual joint angle"
-        ),
-    }
-    tip_dims = ("tip",) if loop.finger.description.tree.tip_names else ("finger",)
-    dims = ("time", *(tip_dims if len(loop.finger.rigid_body.tips) > 1 else ()), "axis")
-    table |= {
-        "fingertip_position": Quantity(dims, lambda run: run.motion.tip, "m", "fingertip position", "1"),
-        **_tendon_variables(),
-        "joint_torque_command": Quantity(_JOINT, lambda run: run.control.torque, "N m", "desired joint torque", "19"),
-        "joint_torque": Quantity(_JOINT, lambda run: run.finger.tendon_torque, "N m", "torque of the tendons", "11"),
-        "joint_friction": Quantity(
-            _JOINT, lambda run: run.finger.joints.friction, "N m", "joint friction torque", "9c"
-        ),
-        "joint_reaction": Quantity(_JOINT, lambda run: run.finger.joints.reaction, "N", "joint reaction force", "17"),
-        "limiter_torque": Quantity(_JOINT, lambda run: run.finger.limiter_torque, "N m", "stroke limiter torque", "2"),
-        "fingertip_force": Quantity(dims, lambda run: run.force, "N", "force on the fingertip", "6"),
-        "spring_torque": Quantity(_JOINT, lambda run: run.finger.spring_torque, "N m", "torque of the joints' springs"),
-        "external_torque": Quantity(
-            _JOINT, lambda run: run.finger.external_torque, "N m", "torque of the fingertip force", "6"
-        ),
-        SHORTFALL: Quantity(_JOINT, _shortfall, "N m", "desired torque that tension limits keep from being planned"),
-    }
-    if isinstance(loop.prescribed_motion, PrescribedJoints):
-        table["joint_effort"] = Quantity(_JOINT, _effort, "N m", "torque that the given motion of a joint takes", "18")
-    if loop.finger.layout.names_of("joint_stiction"):
-        table["joint_stiction"] = state_block("joint_stiction")
-    if loop.finger.layout.names_of("elastic_stiction"):
-        table["elastic_stiction"] = state_block("elastic_stiction")
-    table |= (
-        _wrap_variables(loop)
-        | cord_variables(loop.finger)
-        | _winding_variables(loop)
-        | _palm_variables(loop)
-        | motor_variables(loop)
-        | _passive_tendon_variables(loop)
-        | _sensor_variables(loop)
-        | _contact_and_row_variables(loop)
-    )
-    for name, quantity in table.items():
-        if frame := _frame(name, quantity):
-            table[name] = quantity._replace(frame=frame)
-    return table
-
-
-def _tendon_variables() -> dict[str, Quantity]:
-    return {
-        "tendon_command": Quantity(_TENDON, _commanded_tension, "N", "commanded or planned tension", "21b"),
-        "tendon_tension": Quantity(
-            _TENDON,
-            lambda run: run.loop.finger.routing.tendon_tension(run.finger.tendons.strands),
-            "N",
-            "delivered tension; distal half of a passive tendon",
-            "12",
-        ),
-        "tendon_velocity": Quantity(_TENDON, lambda run: run.finger.tendons.velocity, "m/s", "sliding velocity", "3"),
-        "tendon_friction": Quantity(
-            _TENDON, lambda run: run.finger.tendons.friction, "N", "tendon friction force", "9c"
-        ),
-        "tendon_stiction": state_block("tendon_stiction"),
-        "tendon_normal_force": Quantity(
-            _TENDON, lambda run: run.finger.tendons.normal, "N", "sum of the tensions at both ends", "14"
-        ),
-        "tendon_friction_coefficient": Quantity(
-            _TENDON, lambda run: run.finger.tendons.coefficient, "1", "Coulomb coefficient", "16"
-        ),
-        "tendon_curvature": Quantity(
-            _TENDON, lambda run: run.finger.tendons.curvature, "rad", "total curvature of the path", "15"
-        ),
-    }
+RESIDUAL = "energy_residual"
+#: What a run that goes on needs of its loops' last sample, in the order of `LoopMemory`.
+LOOP_VARIABLES = ("position_loop_age", "position_loop_error", "position_loop_integral", "position_loop_voltage")
 
 
 def _commanded_tension(run: SampledTrajectory) -> Array:
     routing, command = run.loop.finger.routing, run.control.tension
     # A winch is commanded a length.
     return np.where(np.append(routing.winched, np.zeros(routing.passive, dtype=bool)), 0.0, command)
-
-
-def _winding_variables(loop: ClosedLoop) -> dict[str, Quantity]:
-    """Return the commands to spools in position drive and to winches; zero elsewhere."""
-    routing, actuators = loop.finger.routing, loop.finger.actuators
-
-    def angle(run: SampledTrajectory) -> Array:
-        angles = np.zeros((len(run.times), len(actuators.names)))
-        if run.spool_goals is not None:
-            angles[:, actuators.holds] = run.spool_goals
-        return angles
-
-    def length(run: SampledTrajectory) -> Array:
-        lengths = np.zeros((len(run.times), len(routing.tendons)))
-        winched = np.flatnonzero(routing.winched)
-        lengths[:, winched] = run.control.tension[:, winched]
-        lengths[:, actuators.tendons] = run.wound_lengths(angle(run))
-        return lengths
-
-    text = "tension at the canal's entrance: at a spool, of an ideal source, or of a passive tendon's proximal half"
-    table = {}
-    if actuators.names or routing.winched.any():
-        table["spool_tension"] = Quantity(_TENDON, lambda run: run.finger.tendons.entering, "N", text)
-    if actuators.holds.any() and (loop.drives is None or loop.drives.compiled is not None):
-        table["spool_angle"] = Quantity(_MOTORS, angle, "rad", "commanded angle of a spool in position drive, else 0")
-    if "spool_angle" in table or routing.winched.any():
-        table["tendon_winding"] = Quantity(_TENDON, length, "m", "commanded length of cord that is wound in, else 0")
-    return table
-
-
-def _wrap_variables(loop: ClosedLoop) -> dict[str, Quantity]:
-    """Return the signals of tendons that rub at several places."""
-    if not loop.finger.wraps:
-        return {}
-
-    def wrap_signal(run: SampledTrajectory, signal: Callable[[RowSignals], Array]) -> Array:
-        return run.finger.tendons.at_wraps(signal)
-
-    signals: dict[str, tuple[Callable[[RowSignals], Array], str, str]] = {
-        "wrap_friction": (lambda wraps: wraps["friction"], "N", "friction force at every bend of a tendon"),
-        "wrap_velocity": (lambda wraps: wraps.row.speed, "m/s", "sliding velocity at every bend of a tendon"),
-        "wrap_curvature": (lambda wraps: wraps.row.curvature, "rad", "curvature of every bend of a tendon"),
-        "wrap_level": (lambda wraps: wraps["level"], "N", "friction of steady sliding at every bend of a tendon"),
-    }
-    tension = Quantity(
-        ("time", "wrap"), lambda run: run.finger.tendons.wrap_tension, "N", "tension behind every bend of a tendon"
-    )
-    return {"wrap_tension": tension} | {
-        name: Quantity(("time", "wrap"), partial(wrap_signal, signal=signal), unit, text)
-        for name, (signal, unit, text) in signals.items()
-    }
-
-
-def _frame(name: str, variable: Quantity) -> str:
-    """Return the frame of a variable with components: the base, but the world for the motion of the palm."""
-    if not {"axis", "quaternion"} & set(variable.dims):
-        return ""
-    return WORLD_FRAME if name.startswith("palm_") else BASE_FRAME
-
-
-def _contact_and_row_variables(loop: ClosedLoop) -> dict[str, Quantity]:
-    table = {
-        name: Quantity(dims, partial(contact_value, name=name), units, text)
-        for name, (dims, units, text) in contact_variables(loop.finger).items()
-    }
-    return table | extra_row_variables(loop.finger.extra_rows) | account_variables(loop.finger)
 
 
 def _shortfall(run: SampledTrajectory) -> Array:
@@ -191,47 +47,145 @@ def _effort(run: SampledTrajectory) -> Array:
     return np.asarray(torque - (mechanism.torque + mechanism.external)[:, : torque.shape[1]])
 
 
-def _palm_variables(loop: ClosedLoop) -> dict[str, Quantity]:
-    if loop.palm is None:
-        return {}
-    path = loop.palm
-
-    def orientation(run: SampledTrajectory) -> Array:
-        return np.array([pin.Quaternion(rotation).coeffs() for rotation in path.place(run.times)[1]])
-
-    text = "rotation of the palm to the world, x, y, z, w"
-    return {
-        "palm_position": Quantity(
-            ("time", "axis"), lambda run: path.place(run.times)[0], "m", "place of the palm in the world"
-        ),
-        "palm_orientation": Quantity(("time", "quaternion"), orientation, "1", text),
-        "palm_velocity": Quantity(
-            ("time", "axis"), lambda run: path.velocity(run.times)[0], "m/s", "velocity of the palm in the world"
-        ),
-        "palm_angular_velocity": Quantity(
-            ("time", "axis"), lambda run: path.velocity(run.times)[1], "rad/s", "angular velocity of the palm"
-        ),
-    }
+def _spool_angle(run: SampledTrajectory) -> Array:
+    actuators = run.loop.finger.actuators
+    angles = np.zeros((len(run.times), len(actuators.names)))
+    if run.spool_goals is not None:
+        angles[:, actuators.holds] = run.spool_goals
+    return angles
 
 
-def _passive_tendon_variables(loop: ClosedLoop) -> dict[str, Quantity]:
-    count, actuated = loop.finger.routing.passive, loop.finger.routing.actuated
-    if not count:
-        return {}
-    # One passive tendon, the common case, needs no separate dimension.
-    single = count == 1
-    dims = ("time",) if single else _PASSIVE
+def _winding(run: SampledTrajectory) -> Array:
+    routing, actuators = run.loop.finger.routing, run.loop.finger.actuators
+    lengths = np.zeros((len(run.times), len(routing.tendons)))
+    winched = np.flatnonzero(routing.winched)
+    lengths[:, winched] = run.control.tension[:, winched]
+    lengths[:, actuators.tendons] = run.wound_lengths(_spool_angle(run))
+    return lengths
 
-    def squeezed(values: Array) -> Array:
-        return values[:, 0] if single else values
 
-    def proximal(run: SampledTrajectory) -> Array:
-        return squeezed(run.finger.tendons.strands[..., actuated::2])
+def _holds_spools(loop: ClosedLoop) -> bool:
+    return bool(loop.finger.actuators.holds.any()) and (loop.drives is None or loop.drives.compiled is not None)
 
-    return {
-        "passive_tension_proximal": Quantity(dims, proximal, "N", "tension of the proximal half", "12"),
-        **{name: state_block(name, single) for name in ("passive_position", "passive_velocity")},
-    }
+
+def _loop_age(run: SampledTrajectory) -> Array:
+    assert run.loop.drives is not None and run.loop.drives.compiled is not None
+    drives = run.loop.drives.compiled
+    elapsed: Array = run.times - drives.first - drives.period * drives.latest(run.times)
+    return np.maximum(elapsed, 0.0)
+
+
+def _loop_sample(run: SampledTrajectory, history: str) -> Array:
+    """Return what position loops had at their last sample; zero for motors without one."""
+    assert run.loop.drives is not None and run.loop.drives.compiled is not None
+    drives = run.loop.drives.compiled
+    values = np.zeros((len(run.times), len(run.loop.finger.actuators.names)))
+    values[:, run.loop.finger.actuators.holds] = drives.zero_order_hold(getattr(drives, history), run.times)
+    return values
+
+
+def _palm(run: SampledTrajectory, motion: str, part: int) -> Array:
+    value: Array = getattr(run.loop.palm, motion)(run.times)[part]
+    return value
+
+
+def _palm_orientation(run: SampledTrajectory) -> Array:
+    return np.array([pin.Quaternion(rotation).coeffs() for rotation in _palm(run, "place", 1)])
+
+
+_of_run = partial(Quantity, of_finger=False)
+_JOINT, _MOTOR, _TIP = ("joint",), ("motor",), ("fingertip", "axis")
+_of_palm = partial(_of_run, frame=WORLD_FRAME)
+
+#: The variables of a run beside the signals of its finger.
+RUN_SECTIONS = (
+    Section(
+        ALWAYS,
+        lambda loop: True,
+        {
+            "joint_reference": _of_run(_JOINT, "rad", "desired joint angle", attrgetter("reference.position"), "20"),
+            "tracking_error": _of_run(
+                _JOINT,
+                "rad",
+                "desired less actual joint angle",
+                lambda run: run.reference.position - run.state.position,
+            ),
+            "fingertip_position": _of_run(_TIP, "m", "fingertip position", attrgetter("motion.tip"), "1"),
+            "fingertip_force": _of_run(_TIP, "N", "force on the fingertip", attrgetter("force"), "6"),
+            "tendon_command": _of_run(("tendon",), "N", "commanded or planned tension", _commanded_tension, "21b"),
+            "joint_torque_command": _of_run(_JOINT, "N m", "desired joint torque", attrgetter("control.torque"), "19"),
+            SHORTFALL: _of_run(_JOINT, "N m", "desired torque that tension limits keep from being planned", _shortfall),
+        },
+    ),
+    Section(
+        "With a motion of the joints that is given",
+        lambda loop: isinstance(loop.prescribed_motion, PrescribedJoints),
+        {"joint_effort": _of_run(_JOINT, "N m", "torque that the given motion of a joint takes", _effort, "18")},
+    ),
+    Section(
+        "With motors in position drive",
+        _holds_spools,
+        {"spool_angle": _of_run(_MOTOR, "rad", "commanded angle of a spool in position drive, else 0", _spool_angle)},
+    ),
+    Section(
+        "With motors in position drive or winches",
+        lambda loop: _holds_spools(loop) or loop.finger.routing.winched.any(),
+        {"tendon_winding": _of_run(("tendon",), "m", "commanded length of cord that is wound in, else 0", _winding)},
+    ),
+    Section(
+        "With a palm that moves",
+        lambda loop: loop.palm,
+        {
+            "palm_position": _of_palm(
+                ("axis",), "m", "place of the palm in the world", partial(_palm, motion="place", part=0)
+            ),
+            "palm_orientation": _of_palm(
+                ("quaternion",), "1", "rotation of the palm to the world, x, y, z, w", _palm_orientation
+            ),
+            "palm_velocity": _of_palm(
+                ("axis",), "m/s", "velocity of the palm in the world", partial(_palm, motion="velocity", part=0)
+            ),
+            "palm_angular_velocity": _of_palm(
+                ("axis",), "rad/s", "angular velocity of the palm", partial(_palm, motion="velocity", part=1)
+            ),
+        },
+    ),
+    Section(
+        "With position loops of motors",
+        lambda loop: loop.drives is not None and loop.drives.compiled is not None,
+        {
+            LOOP_VARIABLES[0]: _of_run((), "s", "time since the last sample of the position loops", _loop_age),
+            LOOP_VARIABLES[1]: _of_run(
+                _MOTOR,
+                "rad",
+                "commanded less measured angle at the last sample of a position loop, else 0",
+                partial(_loop_sample, history="errors"),
+            ),
+            LOOP_VARIABLES[2]: _of_run(
+                _MOTOR,
+                "rad s",
+                "integral of the error of a position loop, as the loop has it, else 0",
+                partial(_loop_sample, history="integrals"),
+            ),
+            LOOP_VARIABLES[3]: _of_run(
+                _MOTOR,
+                "V",
+                "voltage that a position loop has asked for; 1e30 where the motor is let go",
+                partial(_loop_sample, history="voltages"),
+            ),
+        },
+    ),
+)
+
+
+def variables(loop: ClosedLoop) -> dict[str, Quantity]:
+    """Return all variables that a result of a loop can have, by name."""
+    finger = loop.finger
+    table = {name: each for section in RUN_SECTIONS if section.holds(loop) for name, each in section.signals.items()}
+    tips = ("tip",) if finger.description.tree.tip_names else ("finger",)
+    dims = (*(tips if len(finger.rigid_body.tips) > 1 else ()), "axis")
+    table |= {name: each._replace(dims=dims) for name, each in table.items() if each.dims == _TIP}
+    return finger.signal_table | table | _sensor_variables(loop) | _account_variables(loop)
 
 
 def _sensor_variables(loop: ClosedLoop) -> dict[str, Quantity]:
@@ -241,14 +195,40 @@ def _sensor_variables(loop: ClosedLoop) -> dict[str, Quantity]:
         return run.loop.controller.measured(name, run.times)
 
     return {
-        f"measured_{sensor.name}": Quantity(
-            ("time", sensor.dimension) if sensor.dimension else _TIME,
-            partial(reading, name=sensor.name),
+        f"measured_{sensor.name}": _of_run(
+            (sensor.dimension,) if sensor.dimension else (),
             sensor.units,
             f"{sensor.name.replace('_', ' ')} as the controller measures it",
+            partial(reading, name=sensor.name),
         )
         for sensor in loop.controller.sensors
     }
+
+
+def _account_variables(loop: ClosedLoop) -> dict[str, Quantity]:
+    """Return the stored energies, the powers, their integrals and the residual of the account, by name."""
+
+    def stored(run: SampledTrajectory, name: str) -> Array:
+        return run.stored[name]
+
+    def power(run: SampledTrajectory, name: str) -> Array:
+        return run.powers[name]
+
+    def work(run: SampledTrajectory, name: str) -> Array:
+        return run.account.works[name]
+
+    table = {}
+    for term in stored_terms(loop.finger):
+        value, text = partial(stored, name=term.name), f"energy stored: {term.label}"
+        table[f"energy_{term.name}"] = _of_run((), "J", text, value, energy_term=term)
+    # Supplied powers come before losses.
+    for term in sorted(flow_terms(loop.finger.mechanism.energies), key=lambda term: term.kind == LOST):
+        name, text = term.name, f"{term.kind}: {term.label}"
+        exchanged = partial(work, name=name)
+        table[f"power_{name}"] = _of_run((), "W", f"power {text}", partial(power, name=name), energy_term=term)
+        table[f"energy_exchanged_{name}"] = _of_run((), "J", f"energy {text}", exchanged, energy_term=term)
+    text = "stored energy less its start, less supplied, plus lost: zero for an exact integration"
+    return table | {RESIDUAL: _of_run((), "J", text, attrgetter("account.residual"))}
 
 
 def coordinates(scenario: Scenario, loop: ClosedLoop, times: Array) -> dict[str, Any]:

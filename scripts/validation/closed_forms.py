@@ -92,7 +92,7 @@ def slide(finger: Finger, velocity: float, travel: float = 2e-3, stiction: float
             slopes.append(float(core.evaluate(at, tension).rate[2]))
         x[2] += h / 6.0 * (slopes[0] + 2.0 * slopes[1] + 2.0 * slopes[2] + slopes[3])
         record.append(x[2])
-    delivered = float(core.evaluate(x, tension).tendons.strands[0])
+    delivered = float(core.evaluate(x, tension).strands[0])
     return Slide(np.arange(1, steps + 1, dtype=np.float64) * velocity * h, np.array(record), delivered)
 
 

@@ -65,7 +65,7 @@ def against_pinocchio(finger: Finger) -> Compared:
     core = CompiledFinger(finger)
     signals = core.evaluate(x, command)
     q, v = signals.state.position, signals.state.velocity
-    torque = signals.tendon_torque - signals.joints.friction - signals.limiter_torque
+    torque = signals["joint_torque"] - signals["joint_friction"] - signals["limiter_torque"]
     moved = core.motion(q, v)
     model, data = finger.rigid_body.model, finger.rigid_body.model.createData()
     acceleration, tips, kinetic, potential = [], [], [], []
@@ -76,7 +76,7 @@ def against_pinocchio(finger: Finger) -> Compared:
         kinetic.append(pin.computeKineticEnergy(model, data, row[0], row[1]))
         potential.append(pin.computePotentialEnergy(model, data, row[0]))
     return Compared(
-        relative(signals.acceleration, np.array(acceleration)),
+        relative(signals["joint_acceleration"], np.array(acceleration)),
         Comparison(moved.tip, np.array(tips)).largest,
         relative(moved.kinetic_energy, np.array(kinetic)),
         Comparison(moved.potential_energy, np.array(potential)).largest / float(np.max(np.abs(potential))),

@@ -132,8 +132,8 @@ def test_motors_pull_tendons_along_paths_through_spools_and_stretch():
     expected = hand.coupling_at([0.2])[:, 0] / 0.005
     np.testing.assert_allclose(hand.layout.unpack(x).motor_velocity, expected, rtol=1e-12)
     found = hand.evaluate(x, np.array([3.0, 2.0]))
-    np.testing.assert_allclose(found.tendons.strands, [3.0, 2.0], atol=0.02)
-    np.testing.assert_allclose(found.tendon_torque, found.tendons.strands @ hand.coupling_at([0.2]), rtol=1e-9)
+    np.testing.assert_allclose(found.strands, [3.0, 2.0], atol=0.02)
+    np.testing.assert_allclose(found["joint_torque"], found.strands @ hand.coupling_at([0.2]), rtol=1e-9)
     np.testing.assert_allclose(CompiledFinger(hand).evaluate(x, np.array([3.0, 2.0])).rate, found.rate, atol=1e-6)
 
 

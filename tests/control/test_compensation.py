@@ -65,7 +65,7 @@ def test_gravity_compensation_holds_a_frictionless_finger_exactly_at_its_referen
         controller = fp.control.build_controller(scenario, finger)
         for position in postures(5, 1)[0]:
             command = controller.command(0.0, still(position), position, np.zeros(4)).tension[:4]
-            found = finger.evaluate(finger.rest_state(position), command).acceleration
+            found = finger.evaluate(finger.rest_state(position), command)["joint_acceleration"]
             body = finger.rigid_body
             falls = np.linalg.solve(body.mass_matrix(position), -body.gravity_torque(position))
             np.testing.assert_allclose(found, falls if settings else 0.0, rtol=1e-8, atol=1e-6)
@@ -145,8 +145,8 @@ def test_a_steadily_sliding_tendon_delivers_exactly_what_was_planned():
     state = finger.layout.unpack(x)
     state.velocity[:] = velocities
     for _ in range(2000):
-        forces = finger.evaluate(x, command[:, :4]).tendons
-        state.tendon_stiction[:] += 5e-5 * forces.stiction_rate
+        forces = finger.evaluate(x, command[:, :4])
+        state.tendon_stiction[:] += 5e-5 * forces.at_first_place("rate")
     np.testing.assert_allclose(forces.strands[:, :4], np.tile(planned[:4], (4, 1)), rtol=1e-7)
 
 
@@ -180,12 +180,12 @@ def test_with_all_compensations_a_sliding_finger_moves_as_if_it_had_no_friction(
     level = math.tanh(0.5 * 0.11 * 0.58) * (1.0 + 0.5 * np.exp(-abs(speed) / 0.01)) * np.sign(speed)
     x = settled_states(finger, position, velocity, command[:, :4], (WISH * (1 + level), WISH * (1 - level)))
     signals = finger.evaluate(x, command[:, :4])
-    for i, torque in enumerate(signals.tendon_torque):
+    for i, torque in enumerate(signals["joint_torque"]):
         drift = finger.rigid_body.coriolis_matrix(position[i], velocity[i]) @ velocity[i]
-        driven = finger.rigid_body.mass_matrix(position[i]) @ signals.acceleration[i]
+        driven = finger.rigid_body.mass_matrix(position[i]) @ signals["joint_acceleration"][i]
         np.testing.assert_allclose(driven, -drift, atol=1e-7 * abs(torque).max())
     # The viscous part of T5's friction is no part of the capstan balance of its halves.
-    np.testing.assert_allclose(8.8e-6 * signals.tendons.passive_acceleration[:, 0], -1.0 * speed, atol=1e-6)
+    np.testing.assert_allclose(8.8e-6 * signals.mechanism.acceleration[:, 4], -1.0 * speed, atol=1e-6)
 
 
 def test_believed_coefficients_are_compensated_instead_of_the_finger_s():

@@ -37,8 +37,8 @@ def test_a_reaction_as_large_as_the_wanted_force_leaves_the_joints_of_a_friction
     work = [(tip(q + step) - tip(q - step)) @ PUSH / 2e-6 for step in 1e-6 * np.eye(len(q))]
     assert np.abs(work).max() > 0.01
     assert found.control.torque - alone.control.torque == pytest.approx(work, abs=1e-9)
-    net = found.finger.tendon_torque + found.finger.external_torque
-    assert net == pytest.approx(alone.finger.tendon_torque, abs=1e-12)
+    net = found.finger["joint_torque"] + found.finger["external_torque"]
+    assert net == pytest.approx(alone.finger["joint_torque"], abs=1e-12)
 
 
 def test_the_wanted_force_follows_its_signal_and_the_scenario_s_clock():

@@ -18,7 +18,7 @@ class Gauge(fp.control.SampledSensor):
         self.noise, self.exact = np.random.default_rng(1).normal(0.0, 1e-3, (100, 2)), []
 
     def read(self, now):
-        self.exact.append(now.signals.tendon_torque[1:3])
+        self.exact.append(now.signals["joint_torque"][1:3])
         return self.exact[-1] + self.noise[len(self.exact) - 1]
 
 

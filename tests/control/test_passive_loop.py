@@ -96,9 +96,9 @@ def test_the_passive_loop_serves_a_custom_controller():
     for step in range(1000):
         command = controller.command(1e-3 * step, reference, state.position, state.velocity)
         state = sim.step(command.tension[:4], 1e-3)
-        delivered = finger.routing.tendon_tension(sim.signals().tendons.strands)
+        delivered = finger.routing.tendon_tension(sim.signals().strands)
         controller.sense({"tendon_tension": delivered}, 1e-3)
-    tension = finger.routing.tendon_tension(sim.signals().tendons.strands)
+    tension = finger.routing.tendon_tension(sim.signals().strands)
     assert tension[4] == pytest.approx(4.0, rel=0.02)
 
 

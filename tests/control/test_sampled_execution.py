@@ -94,9 +94,7 @@ def test_a_tension_sensor_reads_what_is_delivered_under_the_tensions_that_act():
 def test_noise_is_reproducible_by_its_seed_and_has_the_standard_deviation_and_no_memory():
     """For n normal numbers the mean scatters by s / sqrt(n), s by s / sqrt(2 n), correlations by 1 / sqrt(n)."""
     count, deviation = 20000, 0.3
-    finger = SimpleNamespace(routing=SimpleNamespace(tendon_tension=lambda strands: strands))
-    signals = SimpleNamespace(tendons=SimpleNamespace(strands=np.arange(5.0)))
-    now = SimpleNamespace(loop=SimpleNamespace(finger=finger), signals=signals)
+    now = SimpleNamespace(signals={"tendon_tension": np.arange(5.0)})
 
     def readings(seed):
         sensor = TensionSensor(deviation, seed)

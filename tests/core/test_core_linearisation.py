@@ -66,27 +66,28 @@ def pieces(case, times, x):
     rows = [
         np.sign(state.position),
         np.sign(state.velocity),
-        np.sign(found.tendons.velocity),
+        np.sign(found["tendon_velocity"]),
         np.sign(found.command),
-        np.sign(found.limiter_depth),
-        found.limiter_torque != 0.0,
-        found.tendons.strands > 0.0,
-        found.tendons.level > tendon_floor,
-        found.joints.level > finger.description.numbers["joint_friction"]["floor"],
+        np.sign(found.rows["limiter"]["depth"]),
+        found["limiter_torque"] != 0.0,
+        found.strands > 0.0,
+        found.at_all_places("level") > tendon_floor,
+        found.rows["joint_friction"]["level"] > finger.description.numbers["joint_friction"]["floor"],
     ]
-    if found.motors is not None:
+    if finger.actuators.names:
         rows += [
             np.sign(state.motor_velocity),
-            found.tendons.entering > 0.0,
-            np.sign(found.mechanism.rows["elastic_tendons"]["pull"]),
+            found.rows["driven_tendons"].row.command > 0.0,
+            np.sign(found.rows["elastic_tendons"]["pull"]),
             np.sign(
-                found.motors.torque - found.tendons.entering[..., finger.actuators.tendons] @ finger.actuators.spools
+                found["motor_torque"]
+                - found.rows["driven_tendons"].row.command[..., finger.actuators.tendons] @ finger.actuators.spools
             ),
-            np.abs(found.motors.current) < finger.actuators.motor[3],
+            np.abs(found["motor_current"]) < finger.actuators.motor[3],
         ]
     actuated = finger.routing.actuated
-    steady = state.tendon_stiction + finger.tendons.viscous * found.tendons.velocity
-    rows.append(found.tendons.entering[..., :actuated] > steady[..., :actuated])
+    steady = state.tendon_stiction + finger.tendons.viscous * found["tendon_velocity"]
+    rows.append(found.rows["driven_tendons"].row.command > steady[..., :actuated])
     if case.control.kind != HELD:
         # The tendon at its least tension, (22).
         slack = (signals.control.tension - loop.controller.minimum) / loop.controller.internal
@@ -156,8 +157,8 @@ def test_the_states_examined_touch_a_limiter_and_have_a_slack_tendon(examined):
     case, found = examined
     x = np.array([each[1] for each in found])
     signals = case.loop.evaluate(np.array([each[0] for each in found]), x).finger
-    assert np.any(signals.limiter_torque > 0.0) and np.any(signals.limiter_torque < 0.0)
-    assert np.any(signals.tendons.strands == 0.0)
+    assert np.any(signals["limiter_torque"] > 0.0) and np.any(signals["limiter_torque"] < 0.0)
+    assert np.any(signals.strands == 0.0)
 
 
 @pytest.mark.parametrize("g", [1e1, 1e3, 1e6])

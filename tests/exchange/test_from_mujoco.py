@@ -69,7 +69,7 @@ def test_accelerations_are_mujoco_s_without_its_constraints(name):
         for evaluator in (hand, compiled):
             found = evaluator.evaluate(x, inputs(hand, model, data.ctrl))
             # As close as MuJoCo's arms of wraps inside.
-            np.testing.assert_allclose(found.acceleration, data.qacc_smooth, rtol=1e-7, atol=1e-7)
+            np.testing.assert_allclose(found["joint_acceleration"], data.qacc_smooth, rtol=1e-7, atol=1e-7)
 
 
 COUPLED = '<equality><joint joint1="j2" joint2="j1" polycoef="0.4 0.5 0 0 0"/></equality></mujoco>'
@@ -101,7 +101,7 @@ def test_a_part_that_a_flag_of_mujoco_disables_is_off_here(flag):
     def acceleration(read):
         hand = fp.Hand(read_scenario(demo_motion(fp.from_mujoco(read)), SMOOTH).finger)
         given = inputs(hand, model, data.ctrl) if hand.description.tree.actuators else []
-        return hand.evaluate(hand.rest_state(data.qpos, data.qvel), given).acceleration
+        return hand.evaluate(hand.rest_state(data.qpos, data.qvel), given)["joint_acceleration"]
 
     np.testing.assert_allclose(acceleration(switched), data.qacc, rtol=1e-7, atol=1e-7)
     assert np.abs(acceleration(flagged(model)) - data.qacc).max() > 1e-2
@@ -158,7 +158,7 @@ def test_direct_current_motors_and_pid_without_states_push_as_in_mujoco_and_thos
     data.qpos, data.qvel, data.ctrl = [0.2, 0.3], [1.0, -2.0], [4.0, 0.9, 0.0]
     mujoco.mj_forward(model, data)
     found = hand.evaluate(hand.rest_state(data.qpos, data.qvel), data.ctrl[:2])
-    np.testing.assert_allclose(found.acceleration, data.qacc_smooth, rtol=1e-9)
+    np.testing.assert_allclose(found["joint_acceleration"], data.qacc_smooth, rtol=1e-9)
 
 
 def test_without_friction_the_motion_converges_to_mujoco_s_with_order_one():
@@ -214,12 +214,12 @@ def test_a_tendon_that_a_motor_pulls_loses_tension_by_the_turn_of_its_path():
             found = hand.evaluate(x, [5.0, 0.0, 0.0])
             behind = found.mechanism.rows["tendon_branches"]
             # Steady sliding: bristles bear what they can, which depends on what they bear.
-            found.state.tendon_stiction[:] = np.sign(found.tendons.velocity) * found.tendons.level
+            found.state.tendon_stiction[:] = np.sign(found["tendon_velocity"]) * found.at_all_places("level")
             found.state.canal_stiction[-2:] = np.sign(behind.row.speed) * behind["level"]
             x = hand.layout.pack(found.state)
-        assert found.tendons.velocity[0] == pytest.approx(speed)
+        assert found["tendon_velocity"][0] == pytest.approx(speed)
         left = 5.0 * np.exp(-speed * 0.11 * trunk)
-        assert found.tendons.strands[0] == pytest.approx(left, rel=1e-6)
+        assert found.strands[0] == pytest.approx(left, rel=1e-6)
         way = np.sign(behind.row.speed[0])
         assert behind.row.command[0] + behind.force[0] == pytest.approx(left / 2.0 * np.exp(-way * 0.11 * branch))
         assert behind.row.command[1] + behind.force[1] == pytest.approx(left / 3.0, rel=1e-4)

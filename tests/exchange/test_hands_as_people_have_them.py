@@ -245,7 +245,7 @@ def test_limits_of_motors_and_joints_hold_what_they_exert():
     hand = fp.Hand(description.updated(tendon_friction=description.tendon_friction.updated(coulomb=0.0)))
     for given, pulled in ((5.0, 5.0), (30.0, 16.0)):
         found = hand.evaluate(hand.rest_state(np.zeros(2)), np.array([given, 0.7]))
-        np.testing.assert_allclose(found.tendon_torque, [0.0, -0.01 * pulled], rtol=1e-6)
+        np.testing.assert_allclose(found["joint_torque"], [0.0, -0.01 * pulled], rtol=1e-6)
         assert found.mechanism.rows["actuator"].force == pytest.approx([0.3])
 
 
@@ -264,7 +264,7 @@ def test_cords_wound_by_servos_load_pins_and_rub_by_their_turn():
         torque = 0.4 * abs(goal - 0.4)
         tensions = [torque / each if each else 0.0 for each in radii]
         np.testing.assert_allclose(found.mechanism.rows["tendon_cords"].force, tensions, rtol=1e-12)
-        np.testing.assert_allclose(found.joints.reaction, [0.0, sum(tensions)], rtol=1e-12)
+        np.testing.assert_allclose(found["joint_reaction"], [0.0, sum(tensions)], rtol=1e-12)
         levels = found.mechanism.rows["tendon_canals"]["level"]
         expected = [2.0 * each * np.tanh(0.5 * 0.11 * 0.4) * 1.5 for each in tensions]
         np.testing.assert_allclose(levels, np.maximum(expected, 1e-4), rtol=1e-9)

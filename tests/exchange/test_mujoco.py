@@ -81,10 +81,10 @@ def test_mujoco_finds_the_accelerations_of_our_equation_18_at_any_state(name, ov
         state = State(position=position, passive_position=passive, velocity=velocity, passive_velocity=rate)
         ours = finger.evaluate(finger.layout.pack(state), command)
         data = forward(model, np.append(position, passive), np.append(velocity, rate), command)
-        expected = np.append(ours.acceleration, ours.tendons.passive_acceleration)
+        expected = np.append(ours["joint_acceleration"], ours.mechanism.acceleration[..., 4:])
         for found, wanted in zip(np.split(data.qacc, [4]), np.split(expected, [4]), strict=True):
             np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-9 * np.abs(wanted).max(initial=1e-9))
-        seen |= {tuple(ours.tendons.strands[finger.routing.actuated :] > 0.0)}
+        seen |= {tuple(ours.strands[finger.routing.actuated :] > 0.0)}
     # Every combination of taut and slack halves came up.
     assert len(seen) == 4**finger.routing.passive
 

@@ -44,14 +44,14 @@ def test_micro_damping_is_booked_so_that_every_power_is_accounted_for(optional):
     x, command = random_states(optional, 200, seed=3)
     signals = optional.evaluate(x, command)
     booked, state = powers(signals), signals.state
-    tendons = np.sum(signals.tendons.friction * signals.tendons.velocity, axis=-1)
+    tendons = np.sum(signals["tendon_friction"] * signals["tendon_velocity"], axis=-1)
     cords = stiffness(optional, "driven_tendons", "passive_tendons")
-    stored = np.sum(state.tendon_stiction * signals.tendons.stiction_rate / cords, axis=-1)
+    stored = np.sum(state.tendon_stiction * signals.at_first_place("rate") / cords, axis=-1)
     losses = booked["tendon_coulomb"] + booked["tendon_viscous"] + booked["tendon_micro_damping"]
     np.testing.assert_allclose(tendons, stored + losses, rtol=1e-10, atol=1e-12 * np.max(np.abs(stored)))
-    joints = np.sum(signals.joints.friction * state.velocity, axis=-1)
+    joints = np.sum(signals["joint_friction"] * state.velocity, axis=-1)
     pins = stiffness(optional, "joint_friction")
-    stored = np.sum(state.joint_stiction * signals.joints.stiction_rate / pins, axis=-1)
+    stored = np.sum(state.joint_stiction * signals.rows["joint_friction"].rate / pins, axis=-1)
     losses = booked["joint_coulomb"] + booked["joint_viscous"] + booked["joint_micro_damping"]
     np.testing.assert_allclose(joints, stored + losses, rtol=1e-10, atol=1e-12 * np.max(np.abs(stored)))
     assert np.any(booked["tendon_micro_damping"] != 0.0) and np.any(booked["joint_micro_damping"] != 0.0)
@@ -62,11 +62,11 @@ def test_tension_on_a_sticking_tendon_is_damped_by_sigma_1_and_the_normal_force_
     x = optional.rest_state(np.array([0.0, 0.5, 0.5, 0.4]))
     optional.layout.unpack(x).velocity[0] = 1e-2
     command = np.full(4, 5.0)
-    found = optional.evaluate(x, command).tendons
-    speed = found.velocity[:4]
+    found = optional.evaluate(x, command)
+    speed = found["tendon_velocity"][:4]
     micro = np.array([3.0, 0.0, 1.0, 5.0])
     np.testing.assert_allclose(found.strands[:4], command - (1.0 + micro) * speed, rtol=1e-14)
-    np.testing.assert_allclose(found.normal[:4], 10.0 - speed, rtol=1e-14)
+    np.testing.assert_allclose(found["tendon_normal_force"][:4], 10.0 - speed, rtol=1e-14)
     assert np.abs(speed[:2]).min() > 0.0
 
 

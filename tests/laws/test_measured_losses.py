@@ -156,15 +156,17 @@ def test_what_halves_of_a_passive_tendon_hold_pulls_and_loads_as_they_do():
     z = x[:, place : place + 2]
     found = finger.evaluate(x, command)
     without = bare.evaluate(np.delete(x, [place, place + 1], axis=1), command)
-    halves = without.tendons.strands[:, 4:] - z
-    np.testing.assert_allclose(found.tendons.strands[:, 4:], halves, rtol=1e-12)
-    np.testing.assert_allclose(found.tendons.entering[:, 4], halves[:, 0], rtol=1e-12)
-    np.testing.assert_allclose(found.tendons.normal[:, 4], abs(halves.sum(axis=1)), rtol=1e-12)
-    np.testing.assert_allclose(found.joints.reaction, abs(found.tendons.strands @ finger.routing.loads.T), rtol=1e-12)
+    halves = without.strands[:, 4:] - z
+    np.testing.assert_allclose(found.strands[:, 4:], halves, rtol=1e-12)
+    np.testing.assert_allclose(found["passive_tension_proximal"], halves[:, 0], rtol=1e-12)
+    np.testing.assert_allclose(found["tendon_normal_force"][:, 4], abs(halves.sum(axis=1)), rtol=1e-12)
+    np.testing.assert_allclose(found["joint_reaction"], abs(found.strands @ finger.routing.loads.T), rtol=1e-12)
     # What is held pulls at the mass and at the joints.
-    moved = finger.rigid_body.mass_matrix(x[0, :4]) @ (found.acceleration[0] - without.acceleration[0])
+    moved = finger.rigid_body.mass_matrix(x[0, :4]) @ (
+        found["joint_acceleration"][0] - without["joint_acceleration"][0]
+    )
     np.testing.assert_allclose(moved, -z[0] @ finger.strand_coupling[4:], atol=1e-9)
-    pushed = found.tendons.passive_acceleration - without.tendons.passive_acceleration
+    pushed = found.mechanism.acceleration[..., 4:] - without.mechanism.acceleration[..., 4:]
     np.testing.assert_allclose(finger.tendons.mass * pushed[:, 0], z[:, 1] - z[:, 0], atol=1e-9)
     compiled = CompiledFinger(finger).evaluate(x, command)
     np.testing.assert_allclose(compiled.rate, found.rate, rtol=1e-9, atol=1e-6)

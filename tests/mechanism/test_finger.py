@@ -12,11 +12,6 @@ from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.exceptions import InputError
 
-TENDON_SIGNALS = (
-    *("curvature", "coefficient", "velocity", "friction", "normal", "level", "stiction_rate", "entering", "strands"),
-    "passive_acceleration",
-)
-
 
 @pytest.fixture(scope="module", params=["reversals", "stick_slip"])
 def case(request):
@@ -40,22 +35,22 @@ def test_evaluation_agrees_with_the_scalar_model_at_random_states(case, evaluato
         rate, expected = scalar_model(numbers, x, command, force)
         signals = evaluated.evaluate(x, command, force)
         actual = {
-            "phi": signals.tendons.curvature,
-            "slide": signals.tendons.velocity,
-            "loss": signals.tendons.friction,
-            "strands": signals.tendons.strands,
-            "normal": signals.tendons.normal,
-            "torque": signals.tendon_torque,
-            "reaction": signals.joints.reaction,
-            "friction": signals.joints.friction,
-            "limiter": signals.limiter_torque,
-            "external": signals.external_torque,
+            "phi": signals["tendon_curvature"],
+            "slide": signals["tendon_velocity"],
+            "loss": signals["tendon_friction"],
+            "strands": signals.strands,
+            "normal": signals["tendon_normal_force"],
+            "torque": signals["joint_torque"],
+            "reaction": signals["joint_reaction"],
+            "friction": signals["joint_friction"],
+            "limiter": signals["limiter_torque"],
+            "external": signals["external_torque"],
         }
         for name, values in expected.items():
             close(actual[name], values, name)
         for part in (slice(0, 4), slice(4, 5), slice(5, 9), slice(9, 10), slice(10, 15), slice(15, 19)):
             close(signals.rate[part], rate[part], f"rate {part}")
-        close(signals.acceleration, rate[5:9], "acceleration")
+        close(signals["joint_acceleration"], rate[5:9], "acceleration")
         strands, limiter = np.array(expected["strands"]), np.array(expected["limiter"])
         seen.append([*(strands == 0.0), *(strands > 0.0), (limiter > 0).any(), (limiter < 0).any(), force.any()])
     assert np.all(np.any(seen, axis=0)), "the states must cover slack and taut strands, both limits and a force"
@@ -79,15 +74,15 @@ def test_both_sides_of_equation_18_agree_in_newton_euler_recursion(finger):
     data = model.createData()
     for x, command, force in random_states(UB, 40):
         s = finger.evaluate(x, command, force)
-        left = pin.rnea(model, data, x[:4], x[5:9], s.acceleration)
-        right = s.tendon_torque - s.joints.friction - s.limiter_torque + s.external_torque
+        left = pin.rnea(model, data, x[:4], x[5:9], s["joint_acceleration"])
+        right = s["joint_torque"] - s["joint_friction"] - s["limiter_torque"] + s["external_torque"]
         np.testing.assert_allclose(left, right, rtol=1e-9, atol=1e-11)
 
 
 def test_the_mass_of_the_passive_tendon_obeys_equation_13(finger):
     for x, command, _ in random_states(UB, 20):
         s = finger.evaluate(x, command)
-        expected = (s.tendons.strands[4] - s.tendons.strands[5] - s.tendons.friction[4]) / 8.8e-6
+        expected = (s.strands[4] - s.strands[5] - s["tendon_friction"][4]) / 8.8e-6
         assert s.rate[9] == pytest.approx(expected, rel=1e-12)
 
 
@@ -97,13 +92,10 @@ def test_evaluation_of_a_batch_is_that_of_each_state(finger):
     for index in range(12):
         single = finger.evaluate(x[index], command[index], force[index])
         close(batch.rate[index], single.rate, "rate")
-        for group in ("joints", "state"):
-            for name, values in vars(getattr(single, group)).items():
-                close(getattr(getattr(batch, group), name)[index], values, name)
-        for name in TENDON_SIGNALS:
-            close(getattr(batch.tendons, name)[index], getattr(single.tendons, name), name)
-        for name in ("limiter_depth", "limiter_torque", "tendon_torque", "external_torque", "acceleration"):
-            close(getattr(batch, name)[index], getattr(single, name), name)
+        for name, values in vars(single.state).items():
+            close(getattr(batch.state, name)[index], values, name)
+        for name in finger.signal_table:
+            close(batch[name][index], single[name], name)
 
 
 def test_one_force_serves_a_whole_batch(finger):
@@ -129,9 +121,9 @@ def test_the_right_hand_side_is_a_pure_function(finger):
 def test_results_do_not_change_when_the_finger_is_used_again(finger):
     (x, command, force), (y, other, _) = list(random_states(UB, 2))
     signals = finger.evaluate(x, command, np.ones(3))
-    kept = signals.rate.copy(), signals.external_torque.copy(), signals.joints.reaction.copy()
+    kept = signals.rate.copy(), signals["external_torque"].copy(), signals["joint_reaction"].copy()
     finger.evaluate(y, other, force)
-    for before, after in zip(kept, (signals.rate, signals.external_torque, signals.joints.reaction), strict=True):
+    for before, after in zip(kept, (signals.rate, signals["external_torque"], signals["joint_reaction"]), strict=True):
         np.testing.assert_array_equal(before, after)
 
 
@@ -144,7 +136,7 @@ def test_reaction_is_continuous_in_the_force(finger):
     """Zero force takes a shorter path through the code; a tiny one must give the same."""
     for x, command, _ in random_states(UB, 10):
         none, tiny = finger.evaluate(x, command), finger.evaluate(x, command, np.array([1e-13, 0.0, 0.0]))
-        np.testing.assert_allclose(tiny.joints.reaction, none.joints.reaction, atol=1e-12)
+        np.testing.assert_allclose(tiny["joint_reaction"], none["joint_reaction"], atol=1e-12)
 
 
 def test_rest_state_has_no_motion_no_stiction_and_an_even_passive_tendon(finger):
@@ -153,7 +145,7 @@ def test_rest_state_has_no_motion_no_stiction_and_an_even_passive_tendon(finger)
     expected[:4] = theta
     expected[4] = 0.5 * (3.5e-3 * 0.9 + 5e-3 * 0.5)
     np.testing.assert_allclose(finger.rest_state(theta), expected, rtol=1e-14)
-    strands = finger.evaluate(finger.rest_state(theta), np.zeros(4)).tendons.strands
+    strands = finger.evaluate(finger.rest_state(theta), np.zeros(4)).strands
     assert strands[4] == pytest.approx(strands[5], rel=1e-9) and strands[4] > 0.0
 
 

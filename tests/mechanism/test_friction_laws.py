@@ -88,8 +88,8 @@ def test_below_its_level_coulomb_friction_creeps_where_bristles_hold():
     )
     finger = fp.Finger(description)
     x = finger.rest_state(np.array([0.3, 0.3]), np.full(2, speed * np.arctanh(share)))
-    joints = finger.evaluate(x, np.full(finger.routing.actuated, 5.0)).joints
-    np.testing.assert_allclose(joints.friction, share * 2e-3 * joints.reaction, rtol=1e-12)
+    found = finger.evaluate(x, np.full(finger.routing.actuated, 5.0))
+    np.testing.assert_allclose(found["joint_friction"], share * 2e-3 * found["joint_reaction"], rtol=1e-12)
 
 
 @pytest.mark.slow

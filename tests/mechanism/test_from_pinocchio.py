@@ -136,8 +136,8 @@ def test_along_the_motion_the_whole_hand_needs_just_the_torques_that_the_finger_
     for time, row in zip(times, x, strict=True):
         s = finger.evaluate(row, tensions(finger, time, row))
         q, v, a = whole(posture, [row[:4]])[0], np.zeros(16), np.zeros(16)
-        v[:4], a[:4] = row[5:9], s.acceleration
-        net = s.tendon_torque - s.joints.friction - s.limiter_torque
+        v[:4], a[:4] = row[5:9], s["joint_acceleration"]
+        net = s["joint_torque"] - s["joint_friction"] - s["limiter_torque"]
         np.testing.assert_allclose(pin.rnea(hand, data, q, v, a)[:4], net, rtol=1e-8, atol=1e-9)
 
 
@@ -171,7 +171,7 @@ def test_the_finger_follows_its_reference_with_taut_tendons(finger, motion):
     assert np.ptp(x[:, 1]) > 0.4
     assert np.abs(error[10:]).max() < 0.06
     commands = np.array([tensions(finger, time, row) for time, row in zip(times, x, strict=True)])
-    assert finger.evaluate(x, commands).tendons.strands[10:].min() > 0.1
+    assert finger.evaluate(x, commands).strands[10:].min() > 0.1
 
 
 def test_gravity_is_the_description_s(description, hand):
@@ -190,9 +190,9 @@ def test_tendons_at_the_base_run_along_the_axis_that_is_given(finger, descriptio
     np.testing.assert_allclose(axis, [0.0, np.sin(np.radians(5.0)), np.cos(np.radians(5.0))], atol=1e-4)
     np.testing.assert_allclose(finger.rigid_body.link_directions(np.zeros(4)), np.tile(axis, (4, 1)), atol=1e-9)
     x, load = finger.rest_state(np.zeros(4)), np.array([2.0, 3.0, 4.0, 5.0])
-    np.testing.assert_allclose(finger.evaluate(x, load, axis).joints.reaction, [4.0, 9.0, 8.0, 4.0], rtol=1e-9)
+    np.testing.assert_allclose(finger.evaluate(x, load, axis)["joint_reaction"], [4.0, 9.0, 8.0, 4.0], rtol=1e-9)
     across = fp.Finger.from_model(description, hand, JOINTS, TIP, base_axis=(1.0, 0.0, 0.0))
-    reaction = across.evaluate(x, load, axis).joints.reaction
+    reaction = across.evaluate(x, load, axis)["joint_reaction"]
     np.testing.assert_allclose(reaction, [np.hypot(5.0, 1.0), 9.0, 8.0, 4.0], rtol=1e-9)
 
 

@@ -57,7 +57,7 @@ def test_reaction_is_the_norm_of_tendon_pull_and_external_force_at_random_postur
         expected = []
         for e, load in zip(directions(theta), loads([*command, tension, tension]), strict=True):
             expected.append(math.sqrt(sum((f - c * load) ** 2 for c, f in zip(e, force, strict=True))))
-        np.testing.assert_allclose(signals.joints.reaction, expected, rtol=1e-9)
+        np.testing.assert_allclose(signals["joint_reaction"], expected, rtol=1e-9)
 
 
 def test_joint_friction_is_law_9_loaded_by_the_reaction(joints):
@@ -104,4 +104,4 @@ def test_a_joint_without_a_bearing_does_not_slow_down():
     table["joints"] = {"rail": {"range": [-1.0, 1.0]}, "pin": {"range": [-1.0, 1.0]}}
     finger = fp.Finger(read_scenario({"name": "cart", "finger": table, "controller": {"kind": "tensions"}}).finger)
     moving = finger.evaluate(finger.rest_state(np.zeros(2), np.array([0.3, 0.0])), np.zeros(1))
-    assert moving.acceleration == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert moving["joint_acceleration"] == pytest.approx([0.0, 0.0], abs=1e-12)

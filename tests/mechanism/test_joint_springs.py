@@ -35,9 +35,9 @@ def test_springs_enter_the_equation_of_motion_as_a_torque_against_the_joint(spru
         theta, rate = x[:2], x[2:4]
         torque = np.array([K * (theta[0] - REST) + C * rate[0], 0.01 * (theta[1] - 0.4)])
         command = draw.uniform(0.0, 5.0, 3)
-        difference = bare.evaluate(x, command).acceleration - sprung.evaluate(x, command).acceleration
+        difference = bare.evaluate(x, command)["joint_acceleration"] - sprung.evaluate(x, command)["joint_acceleration"]
         np.testing.assert_allclose(sprung.rigid_body.mass_matrix(theta) @ difference, torque, rtol=1e-9)
-        np.testing.assert_allclose(sprung.evaluate(x, command).spring_torque, torque, rtol=1e-13)
+        np.testing.assert_allclose(sprung.evaluate(x, command)["spring_torque"], torque, rtol=1e-13)
 
 
 @pytest.mark.slow
@@ -77,10 +77,10 @@ def test_the_account_of_a_sprung_finger_closes_and_books_its_springs(tmp_path):
 def test_the_torque_that_holds_a_finger_at_rest_is_that_of_gravity_and_springs(sprung):
     theta = np.array([0.7, 0.9])
     at_rest = sprung.evaluate(sprung.rest_state(theta), np.zeros(3))
-    held = sprung.rigid_body.inverse_dynamics(theta, np.zeros(2), at_rest.acceleration)
-    np.testing.assert_allclose(held, -at_rest.spring_torque, rtol=1e-9)
+    held = sprung.rigid_body.inverse_dynamics(theta, np.zeros(2), at_rest["joint_acceleration"])
+    np.testing.assert_allclose(held, -at_rest["spring_torque"], rtol=1e-9)
     gravity = sprung.rigid_body.gravity_torque(theta)
-    np.testing.assert_allclose(sprung.static_torque(theta), gravity + at_rest.spring_torque, rtol=1e-12)
+    np.testing.assert_allclose(sprung.static_torque(theta), gravity + at_rest["spring_torque"], rtol=1e-12)
 
 
 def test_mujoco_has_the_same_springs(sprung):

@@ -71,9 +71,10 @@ def test_accelerations_are_those_of_a_base_on_six_prescribed_joints(loop, time):
         command, force = rng.uniform(0.0, 6.0, 20), rng.normal(size=(5, 3))
         found = dynamics.evaluate(x, command, force, loop.base(time))
         state = loop.finger.layout.unpack(x)
-        torque = found.mechanism.torque[:20] + found.external_torque
+        torque = found.mechanism.torque[:20] + found["external_torque"]
         q, v, a = (
-            np.append(*each) for each in ((place, state.position), (rate, state.velocity), (second, found.acceleration))
+            np.append(*each)
+            for each in ((place, state.position), (rate, state.velocity), (second, found["joint_acceleration"]))
         )
         wanted = np.array(pin.rnea(model, data, q, v, a))
         np.testing.assert_allclose(torque, wanted[6:], rtol=1e-6, atol=1e-8)
@@ -127,7 +128,7 @@ def test_a_palm_that_falls_freely_takes_the_weight_off(scenario):
     described = fp.load_hand("ub_hand", {"hand.gravity": [0.0, 0.0, 0.0]})
     free = fp.Finger(described)
     still = free.evaluate(free.rest_state(q), np.zeros(20))
-    np.testing.assert_allclose(weightless.acceleration[:20], still.acceleration, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(weightless.acceleration[:20], still["joint_acceleration"], rtol=1e-9, atol=1e-9)
     resting = fp.load_scenario("hand", DURATION | {"hand.palm.path": {"z": {"offset": 0.3}}})
     moved, plain = fp.simulate(resting), fp.simulate(fp.load_scenario("hand", DURATION))
     np.testing.assert_allclose(moved.joint_position, plain.joint_position, atol=1e-7)

@@ -88,8 +88,8 @@ def test_crossings_and_tendons_about_the_joints_of_a_tree_are_one_model(place, p
         pull = rng.uniform(2.0, 6.0, 4)
         inputs = np.where(first.routing.winched, first.excursion(x[:3]) + 1e-4 * pull, pull)
         expected, given = (finger.evaluate(x, inputs) for finger in made)
-        assert np.ptp(expected.tendons.friction) > 1e-3
-        np.testing.assert_allclose(given.tendons.friction, expected.tendons.friction, rtol=1e-11, atol=1e-12)
+        assert np.ptp(expected["tendon_friction"]) > 1e-3
+        np.testing.assert_allclose(given["tendon_friction"], expected["tendon_friction"], rtol=1e-11, atol=1e-12)
         np.testing.assert_allclose(given.rate, expected.rate, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(second.excursion(x[:3]), first.excursion(x[:3]), rtol=1e-13)
 

@@ -53,11 +53,12 @@ def test_a_tendon_under_a_drive_does_what_it_does_under_an_ideal_source_of_that_
         getattr(state, name)[...] = acting[:, 2:] if name == "drives" else getattr(parts(x), name)
     packed = driven.layout.pack(state)
     for found in (driven.evaluate(packed, TENSION), CompiledFinger(driven).evaluate(packed, TENSION)):
-        np.testing.assert_allclose(found.tendons.strands, expected.tendons.strands, rtol=1e-12)
-        np.testing.assert_allclose(found.tendons.entering, expected.tendons.entering, rtol=1e-12)
-        np.testing.assert_allclose(found.joints.reaction, expected.joints.reaction, rtol=1e-12)
-        np.testing.assert_allclose(found.tendon_torque, expected.tendon_torque, rtol=1e-12, atol=1e-15)
-        np.testing.assert_allclose(found.acceleration, expected.acceleration, rtol=1e-9)
+        np.testing.assert_allclose(found.strands, expected.strands, rtol=1e-12)
+        entering = (each.rows["driven_tendons"].row.command for each in (found, expected))
+        np.testing.assert_allclose(*entering, rtol=1e-12)
+        np.testing.assert_allclose(found["joint_reaction"], expected["joint_reaction"], rtol=1e-12)
+        np.testing.assert_allclose(found["joint_torque"], expected["joint_torque"], rtol=1e-12, atol=1e-15)
+        np.testing.assert_allclose(found["joint_acceleration"], expected["joint_acceleration"], rtol=1e-9)
 
 
 def test_a_run_records_it_and_its_energy_and_it_answers_a_step_as_its_equation_does(driven):

@@ -57,8 +57,8 @@ def test_a_cord_turns_once_where_several_of_its_points_lie_at_one_place(path, pl
         c, s = np.cos(q[0]), np.sin(q[0])
         below = [0.0, np.arctan2(0.04 * s - 0.007 * c + 0.008, 0.04 * c + 0.007 * s), q.sum() + np.arctan2(0.002, 0.03)]
         by_hand = sum(abs(np.angle(np.exp(1j * turn))) for turn in np.diff(below))
-        assert found.tendons.curvature[0] == pytest.approx(by_hand, rel=1e-9)
-        np.testing.assert_allclose(found.acceleration, expected.acceleration, rtol=1e-9)
+        assert found["tendon_curvature"][0] == pytest.approx(by_hand, rel=1e-9)
+        np.testing.assert_allclose(found["joint_acceleration"], expected["joint_acceleration"], rtol=1e-9)
         compiled = CompiledFinger(several).evaluate(x, pull).rate
         np.testing.assert_allclose(compiled, found.rate, rtol=1e-9, atol=1e-9 * np.max(np.abs(found.rate)))
 

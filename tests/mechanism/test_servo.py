@@ -26,8 +26,10 @@ def test_a_motor_of_a_data_sheet_has_both_its_ends():
     motor = {**data_sheet(0.93, 1.80, 8.482), "encoder": {"range": [-100.0, 100.0]}}
     free = finger(motor, drive="position")
     constant, _, dry = free.description.actuators["servo"].motor.constants
-    stalled = free.evaluate(free.rest_state(np.zeros(1)), np.array([5.0])).motors
-    assert stalled.torque[0] - dry == pytest.approx(0.93, rel=1e-12) and stalled.current[0] == pytest.approx(1.80)
+    stalled = free.evaluate(free.rest_state(np.zeros(1)), np.array([5.0]))
+    assert stalled["motor_torque"][0] - dry == pytest.approx(0.93, rel=1e-12) and stalled["motor_current"][
+        0
+    ] == pytest.approx(1.80)
     # Turned back, the spool lets its tendon hang.
     ended = stepped(free, [-5.0], [5.0])[0]
     assert ended[3] == pytest.approx(-8.482, rel=1e-6)
@@ -76,11 +78,11 @@ def test_pretension_in_equals_tensions_out_at_rest():
     """A spool that winds two tendons: K e0 each at zero; when the joint turns, one gains what the other loses."""
     pulled = finger(SMOOTH, opposed=True, drive="position", pretension=[3.0, 3.0])
     entering = pulled.evaluate(pulled.rest_state(np.zeros(1)), np.zeros(2))
-    np.testing.assert_allclose(entering.tendons.entering, [3.0, 3.0], rtol=1e-12)
+    np.testing.assert_allclose(entering["spool_tension"], [3.0, 3.0], rtol=1e-12)
     np.testing.assert_allclose(entering.rate, 0.0, atol=1e-9)
     x = pulled.rest_state(np.zeros(1))
     pulled.layout.unpack(x).position[:] = 0.01
-    shifted = pulled.evaluate(x, np.zeros(2)).tendons.entering
+    shifted = pulled.evaluate(x, np.zeros(2))["spool_tension"]
     np.testing.assert_allclose(shifted - 3.0, STIFFNESS * RADIUS * np.array([-0.01, 0.01]), rtol=1e-12)
 
 
@@ -95,19 +97,19 @@ def test_two_tendons_hold_a_joint_twice_as_stiff_as_one_until_one_goes_slack():
     slopes = []
     for angle in (0.01, 0.05):
         pulled.layout.unpack(x).position[:] = angle + np.array([1e-6])
-        above = pulled.evaluate(x, np.zeros(2)).acceleration[0]
+        above = pulled.evaluate(x, np.zeros(2))["joint_acceleration"][0]
         pulled.layout.unpack(x).position[:] = angle
-        slopes.append((above - pulled.evaluate(x, np.zeros(2)).acceleration[0]) / 1e-6)
+        slopes.append((above - pulled.evaluate(x, np.zeros(2))["joint_acceleration"][0]) / 1e-6)
     np.testing.assert_allclose(slopes, [-(frequency**2), -(frequency**2) / 2.0], rtol=1e-6)
 
 
 @pytest.mark.parametrize("drive, command", [("tension", 1e4), ("position", 4.9)])
 def test_the_current_limit_saturates_the_torque(drive, command):
     limited = finger({**SMOOTH, "maximum_current": 0.3}, drive=drive)
-    at_rest = limited.evaluate(limited.rest_state(np.zeros(1)), np.array([command])).motors
-    assert at_rest.torque[0] == pytest.approx(0.4 * 0.3) and at_rest.current[0] == pytest.approx(0.3)
+    at_rest = limited.evaluate(limited.rest_state(np.zeros(1)), np.array([command]))
+    assert at_rest["motor_torque"][0] == pytest.approx(0.4 * 0.3) and at_rest["motor_current"][0] == pytest.approx(0.3)
     # The electronics apply R I, whatever was asked for.
-    assert at_rest.voltage[0] == pytest.approx(3.0 * 0.3)
+    assert at_rest["motor_voltage"][0] == pytest.approx(3.0 * 0.3)
 
 
 def test_a_tension_drive_runs_out_of_voltage_where_the_motor_is_fast():
@@ -115,9 +117,11 @@ def test_a_tension_drive_runs_out_of_voltage_where_the_motor_is_fast():
     fast = finger(SMOOTH)
     x = fast.rest_state(np.zeros(1))
     fast.layout.unpack(x).motor_velocity[:] = 10.0
-    found = fast.evaluate(x, np.array([90.0])).motors
-    assert found.current[0] == pytest.approx((5.0 - 0.4 * 10.0) / 3.0) and found.voltage[0] == pytest.approx(5.0)
-    assert 90.0 * SPOOL / 0.4 > found.current[0]
+    found = fast.evaluate(x, np.array([90.0]))
+    assert found["motor_current"][0] == pytest.approx((5.0 - 0.4 * 10.0) / 3.0) and found["motor_voltage"][
+        0
+    ] == pytest.approx(5.0)
+    assert 90.0 * SPOOL / 0.4 > found["motor_current"][0]
 
 
 @pytest.mark.parametrize("weight, turns", [(1.0, True), (4.0, False)], ids=["backdrivable", "not backdrivable"])
@@ -152,8 +156,8 @@ def test_the_level_of_the_gears_is_the_published_one_but_for_a_thousandth_of_its
     for speed in (0.0, 1e-4, 1e-3, 0.1, 2.0, 10.0):
         geared.layout.unpack(x).motor_velocity[:] = -speed
         found = geared.evaluate(x, np.array([7.0]))
-        load = 7.0 * SPOOL + SPOOL * found.tendons.entering[0]
-        assert found.motors.load[0] == pytest.approx(load, rel=1e-12)
+        load = 7.0 * SPOOL + SPOOL * found["spool_tension"][0]
+        assert found["gearbox_load"][0] == pytest.approx(load, rel=1e-12)
         part = c1 + m1 * load
         level = c0 + m0 * load + part * np.exp(-((speed / w) ** exponent))
         assert abs(found.mechanism.rows["gearboxes"]["level"][0] - level) <= 1.1e-3 * part
@@ -174,7 +178,7 @@ def test_a_drive_that_overcomes_all_of_its_friction_slides_its_gears_under_the_c
     state.motor_velocity[:], state.gearbox_stiction[:] = speed, way * level
     found = driven.evaluate(x, np.array([pull]))
     assert found.mechanism.acceleration[-1] == pytest.approx(0.0, abs=1e-6)
-    assert found.motors.load[0] == pytest.approx(abs((1.0 + x0) * torque + way * level + b * speed), rel=1e-6)
+    assert found["gearbox_load"][0] == pytest.approx(abs((1.0 + x0) * torque + way * level + b * speed), rel=1e-6)
 
 
 def test_a_finger_with_ideal_and_servo_tendons_gives_each_strand_to_the_joints():
@@ -185,10 +189,10 @@ def test_a_finger_with_ideal_and_servo_tendons_gives_each_strand_to_the_joints()
     position = np.array([0.1, 0.4, 0.5, 0.3])
     found = mixed.evaluate(mixed.rest_state(position, tension=tension), tension)
     alone = ideal.evaluate(ideal.rest_state(position), tension)
-    np.testing.assert_allclose(found.tendons.strands, alone.tendons.strands, rtol=1e-9)
-    np.testing.assert_allclose(found.tendon_torque, alone.tendon_torque, rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(found.joints.reaction, alone.joints.reaction, rtol=1e-9)
-    np.testing.assert_allclose(found.acceleration, alone.acceleration, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(found.strands, alone.strands, rtol=1e-9)
+    np.testing.assert_allclose(found["joint_torque"], alone["joint_torque"], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found["joint_reaction"], alone["joint_reaction"], rtol=1e-9)
+    np.testing.assert_allclose(found["joint_acceleration"], alone["joint_acceleration"], rtol=1e-6, atol=1e-6)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])

@@ -128,7 +128,7 @@ def test_without_weight_and_inertia_and_with_tendons_parallel_to_the_links_the_f
     still = np.zeros_like(position)
     found = pin_wrench(finger, position, still, still, strands, FORCE)
     x = np.array([finger.rest_state(theta) for theta in position])
-    expected = finger.evaluate(x, strands, FORCE).joints.reaction
+    expected = finger.evaluate(x, strands, FORCE)["joint_reaction"]
     np.testing.assert_allclose(np.linalg.norm(found.force, axis=-1), expected, rtol=1e-12)
     np.testing.assert_allclose(np.linalg.norm(found.paper + found.external, axis=-1), expected, rtol=1e-12)
 

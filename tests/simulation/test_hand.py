@@ -48,7 +48,7 @@ def test_a_placed_finger_accelerates_as_the_same_finger_under_turned_gravity_and
         alone = own.evaluate(x, pull, placed.rotation.T @ force)
         found = whole.evaluate(x, pull, force)
         np.testing.assert_allclose(found.rate, alone.rate, rtol=1e-9, atol=1e-9)
-        np.testing.assert_allclose(found.joints.reaction, alone.joints.reaction, rtol=1e-12)
+        np.testing.assert_allclose(found["joint_reaction"], alone["joint_reaction"], rtol=1e-12)
         tip = own.motion(x[:4], x[5:9]).tip @ placed.rotation.T + placed.position
         np.testing.assert_allclose(whole.motion(x[:4], x[5:9]).tip, tip, rtol=0.0, atol=1e-14)
 

@@ -9,8 +9,8 @@ from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.description.tables import list_scenarios
 from finger_pin.exceptions import InputError
 from finger_pin.simulation.initial_state import with_initial_state
-from finger_pin.simulation.row_variables import LOOP_VARIABLES
 from finger_pin.simulation.setup import Setup
+from finger_pin.simulation.variables import LOOP_VARIABLES
 
 START = {
     "simulation.initial.position": {"proximal": 0.4, "distal": 0.2},

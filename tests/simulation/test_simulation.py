@@ -218,7 +218,7 @@ def test_an_observer_sees_rising_times_and_the_signals_of_the_dynamics_and_chang
     assert len(times) > 3 and np.all(np.diff(times) > 0.0) and times[-1] == observed.end_time
     signals = seen[-1][1].finger
     np.testing.assert_allclose(signals.state.position, observed.joint_position[-1], rtol=1e-12)
-    np.testing.assert_allclose(signals.joints.reaction, observed.joint_reaction[-1], rtol=1e-9)
+    np.testing.assert_allclose(signals["joint_reaction"], observed.joint_reaction[-1], rtol=1e-9)
 
 
 def test_names_and_paths_will_do_for_a_scenario_and_a_finger(tmp_path):

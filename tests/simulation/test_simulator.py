@@ -90,9 +90,9 @@ def test_signals_are_those_of_the_finger_at_the_present_state(finger: fp.Finger)
     simulator.step(TENSION, 2e-3, force)
     expected = finger.evaluate(simulator.x, TENSION, force)
     found = simulator.signals()
-    np.testing.assert_allclose(found.joints.reaction, expected.joints.reaction, rtol=1e-12)
-    np.testing.assert_allclose(found.tendons.strands, expected.tendons.strands, rtol=1e-12)
-    np.testing.assert_allclose(found.acceleration, expected.acceleration, rtol=1e-8, atol=1e-8)
+    np.testing.assert_allclose(found["joint_reaction"], expected["joint_reaction"], rtol=1e-12)
+    np.testing.assert_allclose(found.strands, expected.strands, rtol=1e-12)
+    np.testing.assert_allclose(found["joint_acceleration"], expected["joint_acceleration"], rtol=1e-8, atol=1e-8)
 
 
 @pytest.mark.parametrize(
@@ -240,7 +240,9 @@ def test_a_palm_moves_along_its_path_and_the_result_has_it(tmp_path: Path) -> No
     found = simulator.result()
     np.testing.assert_allclose(simulator.state.position, expected.joint_position[-1], atol=1e-6)
     np.testing.assert_allclose(found.palm_position, expected.palm_position, atol=1e-12)
-    np.testing.assert_allclose(simulator.signals().acceleration, expected.joint_acceleration[-1], rtol=1e-3, atol=1e-2)
+    np.testing.assert_allclose(
+        simulator.signals()["joint_acceleration"], expected.joint_acceleration[-1], rtol=1e-3, atol=1e-2
+    )
     assert abs(float(found.energy_residual[-1])) < 1e-6
 
 

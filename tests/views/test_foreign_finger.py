@@ -111,8 +111,8 @@ def test_several_fingers_on_one_model_are_each_as_alone(robot, description, whol
         state = found.state
         start = alone.rest_state(state.position[own], state.velocity[own])
         each = alone.evaluate(start, command[own], force[index])
-        np.testing.assert_allclose(found.acceleration[own], each.acceleration, rtol=1e-9)
-        np.testing.assert_allclose(found.joints.reaction[own], each.joints.reaction, rtol=1e-12)
+        np.testing.assert_allclose(found["joint_acceleration"][own], each["joint_acceleration"], rtol=1e-9)
+        np.testing.assert_allclose(found["joint_reaction"][own], each["joint_reaction"], rtol=1e-12)
         assert whole.routing.tendons[own] == tuple(f"{finger}.T{i}" for i in range(1, 5))
 
 

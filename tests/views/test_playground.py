@@ -181,8 +181,10 @@ def test_friction_in_use_is_bristle_force_over_its_level():
     session = Session("reversals")
     run(session, 0.2)
     found, reading = session.signals(), session.reading()
-    np.testing.assert_allclose(reading.tendon_use, np.abs(found.state.tendon_stiction) / found.tendons.level)
-    np.testing.assert_allclose(reading.joint_use, np.abs(found.state.joint_stiction) / found.joints.level)
+    np.testing.assert_allclose(reading.tendon_use, np.abs(found.state.tendon_stiction) / found.at_all_places("level"))
+    np.testing.assert_allclose(
+        reading.joint_use, np.abs(found.state.joint_stiction) / found.rows["joint_friction"]["level"]
+    )
     assert 0.9 < reading.tendon_use.max() < 1.3
 
 

@@ -23,9 +23,9 @@ from finger_pin.description.caching import cached_property
 from finger_pin.laws.law import Row
 from finger_pin.mechanism.evaluation import ContactPoints, Evaluation, Outputs
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.mechanism.rows import RowSignals
+from finger_pin.mechanism.signals import FingerSignals
 from finger_pin.mechanism.state import Motion
 from finger_pin.typing import Array
 

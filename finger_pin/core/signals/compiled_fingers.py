@@ -12,8 +12,8 @@ from finger_pin.core.jit import Block, pack
 from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.core.signals.state_batches import STATES, evaluate_many
 from finger_pin.mechanism.evaluation import Outputs
-from finger_pin.mechanism.finger_signals import FingerSignals
 from finger_pin.mechanism.mechanism import PRESCRIBED_ACCELERATIONS
+from finger_pin.mechanism.signals import FingerSignals
 from finger_pin.mechanism.state import Motion
 from finger_pin.typing import Array
 

@@ -14,7 +14,7 @@ from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, l
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.evaluation import ContactPoints
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.finger_signals import FingerSignals
+from finger_pin.mechanism.signals import FingerSignals
 from finger_pin.simulation.netcdf import save
 from finger_pin.simulation.simulator import Simulator
 from finger_pin.typing import Array
@@ -188,14 +188,16 @@ class Session:
     def reading(self) -> Reading:
         """Return the signals of this instant that a page shows."""
         finger, signals = self.finger, self.signals()
-        state, tendons = signals.state, signals.tendons
-        scene, joints = finger.scene, signals.mechanism.rows["joint_friction"]
+        state = signals.state
+        scene, joints = finger.scene, signals.rows["joint_friction"]
         bristles = bool(finger.layout.names_of("joint_stiction"))
         return Reading(
             time=self.simulator.time,
             position=state.position,
-            strands=np.concatenate([tendons.strands, signals.cord_tension]),
-            tension=finger.routing.tendon_tension(tendons.strands),
+            strands=np.concatenate(
+                [signals.strands, signals["cord_tension"]] if finger.cord_names else [signals.strands]
+            ),
+            tension=signals["tendon_tension"],
             tendon_use=_tendon_use(signals),
             joint_use=np.abs(joints.row.state) / joints["level"] if bristles else np.zeros(0),
             force=np.reshape(signals.fingertip_force, (-1, 3)),
@@ -206,10 +208,10 @@ class Session:
 
 def _tendon_use(signals: FingerSignals) -> Array:
     """Return the bristle force of every tendon over its friction limit; of several bends the largest."""
-    tables = [signals.mechanism.rows[name] for name in ("driven_tendons", "passive_tendons")]
+    tables = [signals.rows[name] for name in ("driven_tendons", "passive_tendons")]
     use = np.concatenate([np.abs(rows.row.state) / rows["level"] for rows in tables])
-    for name, weights in signals.wraps.items():
-        wraps = signals.mechanism.rows[name]
+    for name, weights in signals.finger.wraps.items():
+        wraps = signals.rows[name]
         bend_use = np.abs(wraps.row.state) / wraps["level"]
         use = np.maximum(use, np.max((weights != 0.0) * bend_use, axis=1, initial=0.0))
     return use
