@@ -81,16 +81,12 @@ def posed(finger: FingerLike, position: Sequence[float] | Array) -> Finger:
     if finger.tendons.at_bends:
         allowed = 'must be "canal" for statics of tendons along paths through space'
         raise InputError("finger.tendon_friction.place", allowed, finger.description.tendon_friction.place)
-    coupling, actuated = finger.coupling_at(theta), finger.routing.actuated
-    angles_by_route = dict(zip(finger.paths.routes, finger.paths.turn(theta), strict=True))
-    added_curvature = [angles_by_route.get(str(tendon.along), 0.0) for tendon in finger.description.tendons.values()]
-    routing = replace(
-        finger.routing,
-        coupling=coupling,
-        strand_coupling=np.concatenate([coupling[:actuated], finger.routing.strand_coupling[actuated:]]),
-        curvature_offset=finger.routing.curvature_offset + added_curvature,
-        through_space=np.zeros_like(finger.routing.through_space),
-    )
+    turns, tendons = dict(zip(finger.paths.cords, finger.paths.turn(theta), strict=True)), finger.description.tendons
+    cords = {
+        name: cord.posed(finger.routing.joints, arms, turns[str(tendons[name].along)]) if cord.through_space else cord
+        for (name, cord), arms in zip(finger.routing.cords.items(), finger.coupling_at(theta), strict=True)
+    }
+    routing = replace(finger.routing, cords=cords)
     posed_finger = copy.copy(finger)
     posed_finger.routing, posed_finger.tendons = routing, replace(finger.tendons, routing=routing)
     return posed_finger

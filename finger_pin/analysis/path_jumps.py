@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +12,7 @@ from finger_pin.description.caching import memoised
 from finger_pin.description.validation import finite_vector
 from finger_pin.mechanism.coerce import FingerLike, as_finger
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.path_elements import PathTerm, path_kinematics
+from finger_pin.mechanism.path_elements import PathElement, PathTerm, path_kinematics
 from finger_pin.typing import Array
 
 # Postures of a joint that are compared, steps of bisection between two of them, and the smallest jump, m.
@@ -62,7 +61,7 @@ def _jumps(finger: Finger, theta: Array) -> tuple[PathJump, ...]:
     wraps = _wraps(finger)
     if not wraps:
         return ()
-    legs = [(replace(leg, arm=1.0),) for _, _, leg in wraps]
+    legs = [(PathTerm(piece),) for _, _, piece in wraps]
     jumps = []
     for index, (name, joint) in enumerate(finger.description.joints.items()):
 
@@ -120,10 +119,10 @@ def _unexplained(first: Array, second: Array, step: Array | float) -> Array:
     return np.asarray(second[..., 0] - first[..., 0] - 0.5 * step * (first[..., 1] + second[..., 1]))
 
 
-def _wraps(finger: Finger) -> list[tuple[str, str, PathTerm]]:
-    """Return the cords' legs over wraps, with the names of cord and wrap."""
+def _wraps(finger: Finger) -> list[tuple[str, str, PathElement]]:
+    """Return the pieces of cords over wraps, with the names of cord and wrap."""
     return [
-        (name, leg.wrap[0], finger.paths.terms[leg])
+        (name, leg.wrap[0], finger.paths.pieces[leg])
         for name, cord in finger.paths.cords.items()
         for part in cord.parts
         for leg in part.elements

@@ -145,6 +145,13 @@ class Cord(NamedTuple):
         shares = [self.curvature_offset * bends / sum(bent) for bends in bent]
         return tuple(each._replace(curvature_offset=share) for each, share in zip(pieces, shares, strict=True))
 
+    def posed(self, joints: Sequence[str], arms: Array, turn: float) -> Cord:
+        """Return the cord with constant arms about joints, m, and with a turn of its path, rad, both of one posture."""
+        constant = (CordElement(joint, frozenset(), arm) for joint, arm in zip(joints, arms.tolist(), strict=True))
+        own = (element if element.points else element._replace(radius=0.0) for element in self.elements)
+        offset = self.curvature_offset + turn
+        return self._replace(elements=(*constant, *own), curvature_offset=offset, through_space=False)
+
     def arms(self, joints: Sequence[str]) -> Array:
         """Return the piece's arms of constant length about joints, by their names, shape (n,), m."""
         return self._by_joint(joints, "radius")

@@ -6,7 +6,7 @@ then for each passive tendon its proximal and its distal half, since friction ma
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ import scipy
 from numpy.typing import NDArray
 
 from finger_pin.description.caching import cached_property, memoised
+from finger_pin.description.cords import Cord
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.typing import Array, Indices
 
@@ -34,57 +35,65 @@ class Routing:
 
     Attributes:
         joints: Names of the n joints.
-        tendons: Names of the t tendons, actuated first.
+        cords: The t tendons by name, actuated first.
         actuated: Number a of actuated tendons.
-        coupling: H_c, shape (t, n), m; l = H_c theta, equation (3).
-        strand_coupling: H_c2, shape (s, n), m, equation (10).
-        curvature_matrix: Phi, shape (t, n), turn of the path over rotation of the joint, equation (15).
-        curvature_offset: phi_off, shape (t,), rad.
-        loads: Shape (n, s), one where a strand loads a joint, equation (17).
         fingers: Of every finger the indices of its joints and of its tendons; of one finger all.
         winched: Which actuated tendons an ideal winch winds: their input is a length, m; shape (a,).
-        through_space: Which tendons have arms that depend on the posture beside those of H_c, shape (t,).
     """
 
     joints: tuple[str, ...]
-    tendons: tuple[str, ...]
+    cords: Mapping[str, Cord]
     actuated: int
-    coupling: Array
-    strand_coupling: Array
-    curvature_matrix: Array
-    curvature_offset: Array
-    loads: Array
     fingers: tuple[tuple[Indices, Indices], ...]
     winched: NDArray[np.bool_]
-    through_space: NDArray[np.bool_]
 
     @classmethod
     @memoised(lambda _, description: routing_parts(description))
     def from_description(cls, description: FingerDescription) -> Routing:
-        """Build the matrices from the crossings of every tendon."""
-        joints, tendons = tuple(description.joints), tuple(description.tendons)
+        """Read the tendons of a finger."""
+        joints, cords = tuple(description.joints), {name: description.cord(name) for name in description.tendons}
         names = [""] if description.hand is None else [f"{name}." for name in description.hand.fingers]
-        cords = [description.cord(name) for name in tendons]
-        strands = [strand for cord in cords for strand in cord.strands]
+        fingers = tuple((_beginning(joints, name), _beginning(tuple(cords), name)) for name in names)
+        winched = [description.tendons[name].winch is not None for name in description.actuated_names]
+        return cls(joints, cords, len(winched), fingers, np.array(winched, bool))
 
-        def rows(values: Iterable[Array]) -> Array:
-            return np.array([*values]).reshape(-1, len(joints))
+    @cached_property
+    def tendons(self) -> tuple[str, ...]:
+        """Names of the t tendons, actuated first."""
+        return tuple(self.cords)
 
-        return cls(
-            joints=joints,
-            tendons=tendons,
-            actuated=len(description.actuated_names),
-            coupling=rows(cord.arms(joints) for cord in cords),
-            strand_coupling=rows(strand.arms(joints) for strand in strands),
-            curvature_matrix=rows(cord.sliding.turns(joints) for cord in cords),
-            curvature_offset=np.array([cord.sliding.offset for cord in cords]),
-            loads=rows(strand.loads(joints) for strand in strands).T,
-            fingers=tuple((_beginning(joints, name), _beginning(tendons, name)) for name in names),
-            winched=np.array(
-                [description.tendons[name].winch is not None for name in description.actuated_names], bool
-            ),
-            through_space=np.array([cord.through_space for cord in cords], bool),
-        )
+    @cached_property
+    def coupling(self) -> Array:
+        """H_c, shape (t, n), m; l = H_c theta, equation (3)."""
+        return self._rows(cord.arms(self.joints) for cord in self.cords.values())
+
+    @cached_property
+    def strand_coupling(self) -> Array:
+        """H_c2, shape (s, n), m, equation (10)."""
+        return self._rows(strand.arms(self.joints) for cord in self.cords.values() for strand in cord.strands)
+
+    @cached_property
+    def curvature_matrix(self) -> Array:
+        """Phi, shape (t, n), turn of the path over rotation of the joint, equation (15)."""
+        return self._rows(cord.sliding.turns(self.joints) for cord in self.cords.values())
+
+    @cached_property
+    def curvature_offset(self) -> Array:
+        """phi_off, shape (t,), rad."""
+        return np.array([cord.sliding.offset for cord in self.cords.values()])
+
+    @cached_property
+    def loads(self) -> Array:
+        """Shape (n, s), one where a strand loads a joint, equation (17)."""
+        return self._rows(strand.loads(self.joints) for cord in self.cords.values() for strand in cord.strands).T
+
+    @cached_property
+    def through_space(self) -> NDArray[np.bool_]:
+        """Which tendons have arms that depend on the posture beside those of H_c, shape (t,)."""
+        return np.array([cord.through_space for cord in self.cords.values()], bool)
+
+    def _rows(self, values: Iterable[Array]) -> Array:
+        return np.array([*values]).reshape(-1, len(self.joints))
 
     @property
     def passive(self) -> int:

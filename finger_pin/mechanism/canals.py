@@ -12,7 +12,6 @@ sum_k r_k theta_k' T_k = v_1 T_0 - sum_k v_k (T_(k-1) - T_k): what each wrap tak
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -25,26 +24,6 @@ from finger_pin.mechanism.tendon_paths import TendonPaths
 from finger_pin.mechanism.tendons import BRISTLES, SLACK, SOURCES, Tendons
 from finger_pin.mechanism.tree_mechanism import actuator_table
 from finger_pin.typing import Array
-
-
-class _Canal(NamedTuple):
-    """A canal, or one of the places where it rubs.
-
-    Attributes:
-        name: Of the tendon, and which branch.
-        tendon: Index of its numbers of friction.
-        cord: Along which it acts.
-        one_way: Whether what pulls never pushes.
-        sources: By table of earlier rows and the names of these, parts of their forces that are its tension.
-        drag: Level without load, N.
-    """
-
-    name: str
-    tendon: int
-    cord: Cord
-    one_way: bool
-    sources: dict[tuple[str, str], float]
-    drag: float = 0.0
 
 
 class Canals:
@@ -70,91 +49,80 @@ class Canals:
         Args:
             description: Of the finger.
             paths: The tendons of its tree.
-            tendons: With the numbers of friction, those of canals after the finger's own.
+            tendons: With wraps and numbers of friction, those of canals after the finger's own.
             rows: Earlier rows: those of the tree, and of the finger's tendons.
             drive_matrices: Weights with which drives pull the actuated tendons, by table.
             width: Number of coordinates.
         """
-        self.tables: list[Rows] = []
-        self.loads: dict[str, Array] = {}
-        self.wraps: dict[str, Array] = {}
         self._description, self._tree, self._tendons, self._paths = description, description.tree, tendons, paths
         self._joints, self._width = tuple(description.joints), width
-        self._tables_by_group = {table.group: table for table in rows}
+        self.tables: list[Rows] = []
+        self.loads: dict[str, Array] = {}
         # They load the pins by themselves.
         self._loading = {"driven_tendons", *drive_matrices}
-        actuated = [
-            self._actuated(index, name, drive_matrices) for index, name in enumerate(description.actuated_names)
-        ]
-        tension_terms = {each.name: {("driven_tendons", each.name): 1.0} for each in actuated}
-        self._add_wraps(WRAPS, actuated, tension_terms, 2)
-        for table in self.tables:
-            tendon = {row: index for index, each in enumerate(actuated) for _, row in tension_terms[each.name]}
-            self.wraps[table.group] = np.eye(len(tendons.routing.tendons))[:, [tendon[name] for name in table.names]]
         # Asked once: of many cords it takes as many looks at all actuators.
         rubbing = self._tree.rubbing
-        cords = {name: shares for name in rubbing if (shares := self._tree.linked(name))}
-        if cords:
-            self._tables_by_group[CORDS] = self._cords(cords)
-            self.tables.append(self._tables_by_group[CORDS])
-        own = len(tendons.routing.tendons)
-        trunks = [self._trunk(name, index) for index, name in enumerate(rubbing, start=own)]
-        tension_terms |= {each.name: {} for each in trunks}
-        self._add_wraps(CANALS, trunks, tension_terms)
+        shares = {name: each for name in rubbing if (each := self._tree.linked(name))}
+        cords = [self._cords(shares, rows)] if shares else []
+        own, actuated = len(tendons.routing.tendons), tendons.routing.actuated
+        pulls = [self._pull(name) for name in rubbing]
+        self._one_way = np.array([1.0] * own + [float(only_pulls) for _, only_pulls in pulls])
+        canals = list(zip((*tendons.routing.tendons, *rubbing), range(own + len(pulls)), tendons.wraps, strict=True))
+        # By table, weights of its rows in the tension of every canal, which wraps change.
+        tension = {
+            group: np.eye(len(canals), actuated) @ weights[:actuated]
+            for group, weights in {**drive_matrices, "driven_tendons": np.eye(actuated)}.items()
+        }
+        tension |= _input_weights([{}] * own + [sources for sources, _ in pulls], (*rows, *cords))
+        self._add_wraps(WRAPS, canals, range(actuated), tension, first=2)
+        self.wraps = {table.group: tension[table.group][:own] for table in self.tables}
+        self.tables += cords
+        self._add_wraps(CANALS, canals, range(own, len(canals)), tension)
+        # Each rubs by itself at the tension that the pulley divides.
         branches = [
-            branch
-            for each in (*trunks, *actuated)
-            for branch in self._branches_behind_pulley(each, tension_terms[each.name])
+            (f"{name}.{number}", k, branch)
+            for name, k, wraps in (*canals[own:], *canals[:actuated])
+            for number, branch in enumerate(wraps[0].branches, start=1)
+            if branch.elements
         ]
-        self._add_wraps(BRANCHES, branches, {each.name: {} for each in branches})
+        trunks, divisors = [k for _, k, _ in branches], np.array([[branch.divisor] for _, _, branch in branches])
+        self._add_wraps(
+            BRANCHES,
+            [(name, k, branch.wraps) for name, k, branch in branches],
+            range(len(branches)),
+            {group: weights[trunks] / divisors for group, weights in tension.items() if branches},
+        )
 
     def _add_wraps(
         self,
         group: str,
-        canals: Sequence[_Canal],
-        tension_terms: dict[str, dict[tuple[str, str], float]],
+        canals: Sequence[tuple[str, int, Sequence[Cord]]],
+        rubbing: Sequence[int],
+        tension: dict[str, Array],
         first: int = 1,
     ) -> None:
         """Add the tables of friction at wraps, first to last, and note how each changes its canal's tension.
 
         Args:
             group: Name of the tables.
-            canals: Canals.
-            tension_terms: By canal, rows that change its tension by their forces; those of wraps are added.
+            canals: Name, index of the numbers of friction, and wraps of each.
+            rubbing: Which of them.
+            tension: By table, weights of rows in the tension of every canal; those of wraps are added.
             first: Which wrap is the first, from 1.
         """
-        wraps = {canal.name: canal.cord.wraps for canal in canals}
-        for level in range(first, 1 + max(map(len, wraps.values()), default=0)):
-            wrap_group = f"{group}_{level}" if level > 1 else group
-            rubbing = [canal for canal in canals if len(wraps[canal.name]) >= level]
-            at_wraps = [
-                canal._replace(
-                    name=canal.name if level == 1 else f"{canal.name}.{wraps[canal.name][level - 1].name}",
-                    cord=wraps[canal.name][level - 1],
-                    sources=canal.sources | tension_terms[canal.name],
-                )
-                for canal in rubbing
-            ]
-            self._tables_by_group[wrap_group] = self._table(wrap_group, at_wraps)
-            self.tables.append(self._tables_by_group[wrap_group])
-            self._record_joint_loads(wrap_group, at_wraps, whole=level == 1)
-            for canal, at_wrap in zip(rubbing, at_wraps, strict=True):
-                tension_terms[canal.name][wrap_group, at_wrap.name] = 1.0
+        for level in range(first, 1 + max((len(canals[k][2]) for k in rubbing), default=0)):
+            at = [k for k in rubbing if len(canals[k][2]) >= level]
+            wraps = [canals[k][2][level - 1] for k in at]
+            names = [canals[k][0] + f".{wrap.name}" * (level > 1) for k, wrap in zip(at, wraps, strict=True)]
+            table = f"{group}_{level}" if level > 1 else group
+            inputs = {key: weights[at] for key, weights in tension.items() if np.any(weights[at])}
+            self.tables.append(self._table(table, names, wraps, [canals[k][1] for k in at], inputs))
+            # What pulls loads the pins of all joints that the whole canal crosses.
+            self._load_pins(wraps, {**(inputs if level == 1 else {}), table: np.eye(len(at))})
+            tension[table] = np.eye(len(canals))[:, at]
 
-    def _actuated(self, index: int, name: str, drive_matrices: Mapping[str, Array]) -> _Canal:
-        """Return the canal of an actuated tendon, with all rows that pull it."""
-        drives = {
-            (group, self._tables_by_group[group].names[k]): float(weights[index, k])
-            for group, weights in drive_matrices.items()
-            for k in np.flatnonzero(weights[index])
-        }
-        return _Canal(name, index, self._description.cord(name), True, drives)
-
-    def _trunk(self, name: str, index: int) -> _Canal:
-        """Return the canal of a tendon of the tree before its first pulley.
-
-        Its index is that of its friction, after the finger's own tendons.
-        """
+    def _pull(self, name: str) -> tuple[dict[tuple[str, str], float], bool]:
+        """Return what pulls a tendon of the tree, by table and row, and whether all of it never pushes."""
         tree, tendon = self._tree, self._tree.tendons[name]
         sources: dict[tuple[str, str], float] = {}
         # No path through space has a length below zero, at which its spring or its range would push.
@@ -173,23 +141,9 @@ class Canals:
                 one_way &= actuator.only_pulls
         if tree.linked(name):
             sources[CORDS, name] = 1.0
-        return _Canal(name, index, self._description.cord(name), one_way, sources, tendon.friction)
+        return sources, one_way
 
-    def _branches_behind_pulley(self, trunk: _Canal, friction: dict[tuple[str, str], float]) -> list[_Canal]:
-        """Return the branches of a tendon behind a pulley, pulled by the trunk's tension after friction, divided."""
-        return [
-            _Canal(
-                f"{trunk.name}.{number}",
-                trunk.tendon,
-                branch,
-                trunk.one_way,
-                {key: weight / branch.divisor for key, weight in (trunk.sources | friction).items()},
-            )
-            for number, branch in enumerate(trunk.cord.branches, start=1)
-            if branch.elements
-        ]
-
-    def _cords(self, cords: Mapping[str, Mapping[str, float]]) -> Rows:
+    def _cords(self, cords: Mapping[str, Mapping[str, float]], rows: Sequence[Rows]) -> Rows:
         """Return the tensions of cords that turn joints."""
         tree, actuators = self._tree, self._tree.actuators
         shares = [
@@ -201,56 +155,49 @@ class Canals:
             names=tuple(cords),
             parameters=np.array([[float(not tree.opposed(name)) for name in cords]]),
             arm=np.zeros((len(cords), self._width)),
-            inputs=_input_weights(shares, self._tables_by_group),
+            inputs=_input_weights(shares, rows),
             powers=(SOURCES,),
         )
 
-    def _table(self, group: str, canals: Sequence[_Canal]) -> Rows:
+    def _table(
+        self, group: str, names: Sequence[str], wraps: Sequence[Cord], tendons: Sequence[int], inputs: dict[str, Array]
+    ) -> Rows:
         # Drawn in, a tendon gets shorter.
-        routes = [self._paths.along(canal.cord, -1.0) for canal in canals]
-        arm, bends = np.zeros((2, len(canals), self._width))
-        arm[:, : len(self._joints)] = [route.coefficients for route in routes]
-        bends[:, : len(self._joints)] = [canal.cord.turns(self._joints) for canal in canals]
-        numbers = self._tendons.at([canal.tendon for canal in canals], [canal.cord for canal in canals])
+        arms, paths = self._paths.along(wraps, -1.0)
+        arm, bends = np.zeros((2, len(wraps), self._width))
+        arm[:, : len(self._joints)] = arms
+        bends[:, : len(self._joints)] = [wrap.turns(self._joints) for wrap in wraps]
+        numbers = self._tendons.at(tendons, wraps)
         # Drag is that of the whole tendon, before it is divided.
-        numbers[-1] = np.maximum(numbers[-1], [canal.drag * canal.cord.share for canal in canals]) * (
-            not group.startswith(BRANCHES)
-        )
-        one_way = np.array([canal.one_way for canal in canals], dtype=float)
+        numbers[-1] *= not group.startswith(BRANCHES)
         return Rows(
             group=group,
             law=CANAL_FRICTION,
-            names=tuple(canal.name for canal in canals),
-            parameters=np.vstack([numbers, one_way]),
+            names=tuple(names),
+            parameters=np.vstack([numbers, self._one_way[tendons]]),
             arm=arm,
-            inputs=_input_weights([canal.sources for canal in canals], self._tables_by_group),
+            inputs=inputs,
             bends=bends,
-            curvature_offset=np.array([canal.cord.offset for canal in canals]),
-            paths=tuple(route.legs for route in routes),
+            curvature_offset=np.array([wrap.offset for wrap in wraps]),
+            paths=paths,
             stored=BRISTLES,
             powers=(*TENDON_LOSSES, SLACK),
         )
 
-    def _record_joint_loads(self, wrap_group: str, canals: Sequence[_Canal], *, whole: bool) -> None:
-        """Record how tensions and friction of canals load the joints that they cross."""
-        for joint, (name, rubs) in enumerate(zip(self._joints, self._description.bearings, strict=True)):
-            if not rubs:
-                continue
-            for canal in canals:
-                pressing = canal.sources if whole else {}
-                for (group, row), weight in (pressing | {(wrap_group, canal.name): 1.0}).items():
-                    if name in canal.cord.crossed and group not in self._loading:
-                        press = self.loads.setdefault(
-                            group, np.zeros((len(self._joints), self._tables_by_group[group].count))
-                        )
-                        press[joint, self._tables_by_group[group].names.index(row)] += weight
+    def _load_pins(self, wraps: Sequence[Cord], tension: Mapping[str, Array]) -> None:
+        """Record how rows load the pins of the joints that wraps cross, by their weights in the wraps' tensions."""
+        bearings = zip(self._joints, self._description.bearings, strict=True)
+        crossed = np.array([[float(rubs and name in wrap.crossed) for wrap in wraps] for name, rubs in bearings])
+        for group, weights in tension.items():
+            if group not in self._loading and np.any(pressing := crossed @ weights):
+                self.loads[group] = self.loads.get(group, 0.0) + pressing
 
 
-def _input_weights(sources: Sequence[Mapping[tuple[str, str], float]], tables: Mapping[str, Rows]) -> dict[str, Array]:
+def _input_weights(sources: Sequence[Mapping[tuple[str, str], float]], tables: Sequence[Rows]) -> dict[str, Array]:
     """Return the weights of earlier rows in the inputs of some, by table."""
-    inputs: dict[str, Array] = {}
+    rows, inputs = {table.group: table.names for table in tables}, dict[str, Array]()
     for k, source in enumerate(sources):
         for (group, row), weight in source.items():
-            weights = inputs.setdefault(group, np.zeros((len(sources), tables[group].count)))
-            weights[k, tables[group].names.index(row)] += weight
+            weights = inputs.setdefault(group, np.zeros((len(sources), len(rows[group]))))
+            weights[k, rows[group].index(row)] += weight
     return inputs

@@ -25,7 +25,6 @@ from finger_pin.mechanism.rows import Rows
 from finger_pin.mechanism.signal_table import finger_signals
 from finger_pin.mechanism.signals import FingerSignals, Quantity
 from finger_pin.mechanism.state import Motion, as_floats
-from finger_pin.mechanism.tendon_paths import Excursions
 from finger_pin.mechanism.tree_mechanism import build_body
 from finger_pin.typing import Array
 
@@ -84,7 +83,6 @@ class Finger:
             check_joints(rigid_body, description)
         parts = Parts.from_description(description)
         self.routing, self.tendons, self.actuators, self.joint_friction, self.stroke_limiter, self.springs = parts
-        self._excursions = Excursions(self.routing, description, self.paths)
         self.visuals: pin.GeometryModel | None = None
         assembly = assemble(description, self.rigid_body, self.paths, parts, self.constructor_args)
         self.mechanism, self.scene, self.layout, self.drive_matrices, self.wraps, self.extra_rows = assembly
@@ -258,12 +256,12 @@ class Finger:
 
     def coupling_at(self, position: Array) -> Array:
         """Return H_c at postures, shape (..., n), with the arms that tendons along paths have there: (..., t, n), m."""
-        return self._excursions.slopes(as_floats("position", position, len(self.routing.joints)))
+        return self.paths.coupling(as_floats("position", position, len(self.routing.joints)))
 
     def excursion(self, position: Array) -> Array:
         """Return l of the actuated tendons at theta, shape (..., n), also of those along paths; shape (..., a), m."""
         position = as_floats("position", position, len(self.routing.joints))
-        return self._excursions.lengths(position)[..., : self.routing.actuated]
+        return self.paths.excursion(position)[..., : self.routing.actuated]
 
     def powers(
         self, x: Array, inputs: Array, fingertip_force: Array | None = None, base: Array | None = None

@@ -91,25 +91,16 @@ class PathTerm:
     Attributes:
         piece: The piece.
         column: Which of its wrenches.
-        arm: Weight in the row's arm.
-        measure: Weight in the row's length; by default the arm's.
+        arm: Weight in the row's arm and length.
         follows: Whether it begins where the row's leg before it ends: there the path turns.
         bends: Whether its turn is one of the row's path; behind a pulley each branch has rows of its own.
-        apart: Whether its ends lie apart where the joints are at their references.
     """
 
     piece: PathElement
     column: int = 0
     arm: float = 1.0
-    measure: float | None = None
     follows: bool = False
     bends: bool = True
-    apart: bool = True
-
-    @property
-    def length_weight(self) -> float:
-        """Weight in the row's length."""
-        return self.arm if self.measure is None else self.measure
 
 
 #: Column of a gap's moment about the normal.
@@ -165,7 +156,7 @@ def path_kinematics(body: RigidBody, q: Array, paths: Paths, coordinates: int) -
             for (force, point), end in zip(loads, piece.ends[:2], strict=False):
                 wrench = np.concatenate([force, pin.skew(point) @ force])
                 arm += wrench @ (twists[end.joint] - twists[piece.joint])
-            kinematics.length[k] += leg.length_weight * length
+            kinematics.length[k] += leg.arm * length
             kinematics.arm[k, :width] += leg.arm * arm
             # A leg between points at one place has no direction: the path turns from the one before to the one behind.
             bends = leg.bends or (bends and leg.follows)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from finger_pin.description.caching import cached_property
 from finger_pin.exceptions import InputError
 from finger_pin.laws.law import ContactLaw, Law
-from finger_pin.mechanism.path_elements import PathTerm
+from finger_pin.mechanism.path_elements import Paths
 from finger_pin.typing import Array
 
 STORED, SUPPLIED, LOST = "stored", "supplied", "lost"
@@ -123,7 +123,7 @@ class Rows:
     pins: NDArray[np.int64] = None  # type: ignore[assignment]
     bends: Array = None  # type: ignore[assignment]
     curvature_offset: Array = None  # type: ignore[assignment]
-    paths: tuple[tuple[PathTerm, ...], ...] = ()
+    paths: Paths = ()
     stored: Energy = None  # type: ignore[assignment]
     powers: tuple[Energy, ...] = ()
     unit: str = ""

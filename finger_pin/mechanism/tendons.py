@@ -37,20 +37,22 @@ class Tendons:
 
     Attributes:
         description: The finger.
-        routing: The routing matrices.
-        wraps: The places where each of its tendons, and of those of its tree, rubs.
+        routing: Its cords, and their matrices.
     """
 
     description: FingerDescription
     routing: Routing
-    wraps: tuple[tuple[Cord, ...], ...]
 
     @classmethod
     def from_description(cls, description: FingerDescription) -> Tendons:
-        """Find the places where tendons rub."""
-        routing = Routing.from_description(description)
-        wraps = (description.cord(name).wraps for name in (*routing.tendons, *description.canals))
-        return cls(description, routing, tuple(wraps))
+        """Read the tendons of a finger."""
+        return cls(description, Routing.from_description(description))
+
+    @cached_property
+    def wraps(self) -> tuple[tuple[Cord, ...], ...]:
+        """The places where each of its tendons, and of those of its tree, rubs."""
+        cords = (*self.routing.cords.values(), *map(self.description.cord, self.description.canals))
+        return tuple(cord.wraps for cord in cords)
 
     @cached_property
     def several(self) -> dict[int, list[tuple[Array, float, NDArray[np.bool_]]]]:
@@ -112,9 +114,10 @@ class Tendons:
     def friction(self) -> Array:
         """Parameters of `PASSIVE_FRICTION` of the tendons and of the canals of the tree, shape (f, t + c)."""
         settings, numbers = self.description.tendon_friction, self.description.numbers["tendon_friction"]
-        losses = [self.description.tree.tendons[name].friction for name in self.description.canals]
+        own = [0.0] * len(self.routing.tendons)
+        losses = np.array(own + [self.description.tree.tendons[name].friction for name in self.description.canals])
         values = {**numbers, "surface": numbers["coulomb"], "ratio": numbers["stiction_ratio"]}
-        values |= bristles(settings, numbers, np.array([0.0] * len(self.routing.tendons) + losses))
+        values |= bristles(settings, numbers, losses) | {"drag": np.maximum(numbers["drag"], losses)}
         return np.array([values[name] for name in PASSIVE_FRICTION.parameters])
 
     @property

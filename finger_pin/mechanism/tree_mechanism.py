@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,6 +12,7 @@ import pinocchio as pin
 from numpy.polynomial import Polynomial
 
 from finger_pin.description.caching import memoised
+from finger_pin.description.cords import Cord, CordElement
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.routing import routing_parts
 from finger_pin.description.tree import Tree
@@ -26,11 +27,11 @@ from finger_pin.laws.muscle import MUSCLE
 from finger_pin.laws.spring import CONSTANT_FORCE, DEAD_BAND_SPRING, ELASTIC_TENDON, JOINT_SPRING
 from finger_pin.mechanism.bodies import place_bodies
 from finger_pin.mechanism.groups import ELASTIC, MUSCLES, STATEFUL, STATELESS
-from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place
+from finger_pin.mechanism.path_elements import PathElement, Paths, PathTerm, Place
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Energy, Rows
 from finger_pin.mechanism.spans import ANGLE, RISE
-from finger_pin.mechanism.tendon_paths import TendonPath, TendonPaths
+from finger_pin.mechanism.tendon_paths import TendonPaths
 from finger_pin.mechanism.tendons import SOURCES
 from finger_pin.typing import Array
 
@@ -73,13 +74,13 @@ def build_body(description: FingerDescription, body: RigidBody | None = None) ->
         return _tendons_on_bodies(description)
     if description.tree.bodies:
         raise InputError("rigid_body", "has no place beside a tree, whose bodies are its own")
-    return body, TendonPaths.from_description(description, body)
+    return body, TendonPaths(body, description, {})
 
 
 @memoised(lambda it: (place_bodies(it)[0], *routing_parts(it)))
 def _tendons_on_bodies(description: FingerDescription) -> tuple[RigidBody, TendonPaths]:
     body, placed = place_bodies(description)
-    return body, TendonPaths.from_description(description, body, placed)
+    return body, TendonPaths(body, description, placed)
 
 
 def along_paths(description: FingerDescription, paths: TendonPaths, table: Rows) -> Rows:
@@ -89,60 +90,59 @@ def along_paths(description: FingerDescription, paths: TendonPaths, table: Rows)
     """
     if (table.group != "driven_tendons" and not table.pulls) or not paths.cords:
         return table
-    arm, offset, legs, joints = table.arm.copy(), table.offset.copy(), [], len(description.joints)
-    for k, name in enumerate(table.pulls or table.names):
-        drawn = paths.along(description.cord(name).wraps[0], -1.0)
-        arm[k, :joints] = drawn.coefficients
-        legs.append(drawn.legs)
-        offset[k] += paths.reference_lengths.get(description.tendons[name].along, 0.0)
-    return replace(table, arm=arm, measure=arm, offset=offset, paths=tuple(legs))
+    names, arm = table.pulls or table.names, table.arm.copy()
+    arm[:, : len(description.joints)], legs = paths.along([description.cord(name).wraps[0] for name in names], -1.0)
+    drawn = [paths.reference_lengths.get(description.tendons[name].along, 0.0) for name in names]
+    return replace(table, arm=arm, measure=arm, offset=table.offset + drawn, paths=legs)
 
 
 def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -> list[Rows]:
     """Return the rows of a tree, without the friction of loaded tendons, for a number of coordinates."""
     tree = description.tree
-    joints = dict(zip(tree.joints, np.eye(len(tree.joints)), strict=True))
 
     def table(
-        group: str, law: Law, along: dict[str, TendonPath], numbers: Sequence[Sequence[float]], **further: Any
+        group: str, law: Law, names: Iterable[str], numbers: _Numbers, along: tuple[Array, Paths], **further: Any
     ) -> Rows:
-        arm = np.zeros((len(along), width))
-        arm[:, : len(joints)] = [route.coefficients for route in along.values()]
-        paths = tuple(route.legs for route in along.values())
+        arms, paths = along
+        arm = np.zeros((len(arms), width))
+        arm[:, : arms.shape[1]] = arms
         wiring = {"stored": _STORED.get(group), "powers": _EXCHANGED_POWERS.get(group, ())}
-        return Rows(group, law, tuple(along), np.array(numbers, dtype=float).T, arm, paths=paths, **(wiring | further))
+        return Rows(group, law, tuple(names), np.array(numbers, dtype=float).T, arm, paths=paths, **(wiring | further))
 
-    tables: list[Rows] = []
-    for group, law, along, numbers in (
+    described = (
         *_tendons(tree, routes),
-        _couplings(tree, routes, joints),
+        _couplings(description, routes),
         _loops(tree, routes),
         _weights(description, routes),
-    ):
-        if along:
-            tables.append(table(group, law, along, numbers))
+    )
+    tables = [table(*each) for each in described if each[2]]
     cords = {name: each for name, each in tree.tendons.items() if each.slack is not None}
     if cords:
-        along = {name: routes.along(routes.cords[name], -1.0) for name in cords}
+        along = routes.along([routes.cords[name] for name in cords], -1.0)
         offset = np.array([routes.reference_lengths[name] + (each.slack or 0.0) for name, each in cords.items()])
         numbers = [(each.stiffness, each.damping) for each in cords.values()]
-        tables.append(table(ELASTIC, ELASTIC_TENDON, along, numbers, offset=offset, unit="m"))
+        tables.append(table(ELASTIC, ELASTIC_TENDON, cords, numbers, along, offset=offset, unit="m"))
     first = len(description.actuated_names)
     for group, law in ((STATELESS, ACTUATOR), (STATEFUL, ACTUATOR_WITH_STATE), (MUSCLES, MUSCLE)):
         actuators = {name: each for name, each in tree.actuators.items() if actuator_table(each) == group}
-        along = {
-            name: TendonPath(each.gear * joints[each.joint])
-            if each.joint
-            else routes.along(routes.cords[str(each.tendon)], each.gear)
-            for name, each in actuators.items()
-        }
         if actuators:
+            pulled = (
+                _about(each.joint) if each.joint else routes.cords[str(each.tendon)] for each in actuators.values()
+            )
+            along = routes.along(pulled, [each.gear for each in actuators.values()])
             channels = first + np.array([list(tree.actuators).index(name) for name in actuators])
-            tables.append(table(group, law, along, [_actuator(each) for each in actuators.values()], channels=channels))
+            parameters = [_actuator(each) for each in actuators.values()]
+            tables.append(table(group, law, actuators, parameters, along, channels=channels))
     return tables
 
 
-_Described = tuple[str, Law, dict[str, TendonPath], Sequence[Sequence[float]]]
+_Numbers = Sequence[Sequence[float]]
+_Described = tuple[str, Law, Collection[str], _Numbers, tuple[Array, Paths]]
+
+
+def _about(joint: str, radius: float = -1.0) -> Cord:
+    """Return a cord about one joint, by default as long as the joint's coordinate."""
+    return Cord((CordElement(joint, frozenset({joint}), radius),))
 
 
 def _tendons(tree: Tree, routes: TendonPaths) -> list[_Described]:
@@ -152,37 +152,40 @@ def _tendons(tree: Tree, routes: TendonPaths) -> list[_Described]:
     limited = {name: each for name, each in tendons.items() if each.range is not None}
     loaded = {*tree.rubbing}
     rubbing = {name: each for name, each in tendons.items() if each.friction and name not in loaded}
-
-    def along(names: Iterable[str]) -> dict[str, TendonPath]:
-        return {name: routes.routes[name] for name in names}
-
     springs = [(each.stiffness, *each.rest, each.damping) for each in sprung.values()]
     limits = [each.limiter for each in limited.values()]
     # Law (9) whose level is its floor.
     level = [(0, 0, each.friction / _DRY_STICTION, 0, 1, each.friction, 1, 0, 0, 0, 0, 0) for each in rubbing.values()]
     return [
-        ("tendon_spring", DEAD_BAND_SPRING, along(sprung), springs),
-        ("tendon_limit", STROKE_LIMITER, along(limited), limits),
-        ("tendon_dry_friction", PIN_FRICTION, along(rubbing), level),
+        (group, law, names, numbers, routes.along(routes.cords[name] for name in names))
+        for group, law, names, numbers in (
+            ("tendon_spring", DEAD_BAND_SPRING, sprung, springs),
+            ("tendon_limit", STROKE_LIMITER, limited, limits),
+            ("tendon_dry_friction", PIN_FRICTION, rubbing, level),
+        )
     ]
 
 
-def _couplings(tree: Tree, routes: TendonPaths, joints: Mapping[str, Array]) -> _Described:
-    """Return the springs that hold joints to others."""
-    along = {name: coupling_route(tree, routes, each, joints) for name, each in tree.couplings.items()}
-    numbers = [(each.stiffness, each.offset, each.damping) for each in tree.couplings.values()]
-    return "coupling", JOINT_SPRING, along, numbers
+def _couplings(description: FingerDescription, routes: TendonPaths) -> _Described:
+    """Return the springs that hold joints to others: each is a constraint q - f(q_other)."""
+    couplings = description.tree.couplings
+    cords = [
+        Cord(_about(each.joint).elements + (_about(each.other, each.slope).elements if each.other else ()))
+        for each in couplings.values()
+    ]
+    arms, _ = routes.along(cords)
+    numbers = [(each.stiffness, each.offset, each.damping) for each in couplings.values()]
+    paths = tuple(_higher_powers(description, routes, each) for each in couplings.values())
+    return "coupling", JOINT_SPRING, couplings, numbers, (arms, paths)
 
 
-def coupling_route(tree: Tree, routes: TendonPaths, coupling: Coupling, joints: Mapping[str, Array]) -> TendonPath:
-    """Return the constraint of a coupling, q - f(q_other), as a path."""
-    if coupling.other is None:
-        return TendonPath(joints[coupling.joint])
-    route = TendonPath(joints[coupling.joint] - coupling.slope * joints[coupling.other])
-    if not any(coupling.higher):
-        return route
+def _higher_powers(description: FingerDescription, routes: TendonPaths, coupling: Coupling) -> tuple[PathTerm, ...]:
+    """Return the powers of the other coordinate beyond the first in a coupling, as a path."""
+    if coupling.other is None or not any(coupling.higher):
+        return ()
+    tree = description.tree
     # An angle is measured from its range's middle, so that it never comes to half a turn.
-    model, middle = routes.body.model, routes.middles[coupling.other]
+    model, middle = routes.body.model, 0.5 * sum(description.joints[coupling.other].range)
     index = list(tree.joints).index(coupling.other) + 1
     hinge, axis = tree.joints[coupling.other].kind == "hinge", np.array(tree.joints[coupling.other].axis)
     upright = _upright(axis)
@@ -196,18 +199,18 @@ def coupling_route(tree: Tree, routes: TendonPaths, coupling: Coupling, joints: 
     else:
         still = Place(parent, np.array(frame.act(np.array([0.0, 0.0, middle]))))
         piece = PathElement(RISE, numbers, (still, Place(index, np.zeros(3))), parent, frame)
-    return route._replace(legs=(PathTerm(piece, arm=-1.0),))
+    return (PathTerm(piece, arm=-1.0),)
 
 
 def _loops(tree: Tree, routes: TendonPaths) -> _Described:
     """Return the springs that hold points of bodies together, one along each axis of the base."""
-    along = {}
+    heights = {}
     for name, loop in tree.loops.items():
         first, second = routes.placed[loop.body], routes.placed[loop.other]
         for axis, unit in zip("xyz", np.eye(3), strict=True):
-            along[f"{name}.{axis}"] = _height(first.place(loop.position), second.place(loop.other_position), unit)
+            heights[f"{name}.{axis}"] = _height(first.place(loop.position), second.place(loop.other_position), unit)
     numbers = [(loop.stiffness, 0.0, loop.damping) for loop in tree.loops.values() for _ in "xyz"]
-    return "loop", JOINT_SPRING, along, numbers
+    return "loop", JOINT_SPRING, heights, numbers, (np.zeros((len(heights), 1)), tuple(heights.values()))
 
 
 def _weights(description: FingerDescription, routes: TendonPaths) -> _Described:
@@ -220,18 +223,17 @@ def _weights(description: FingerDescription, routes: TendonPaths) -> _Described:
         if size and each.gravity_compensation and each.mass and routes.placed[name].joint
     }
     base, places = Place(0, np.zeros(3)), routes.placed
-    along = {
-        name: _height(base, places[name].place(each.centre), -gravity / size) for name, each in compensated.items()
-    }
+    heights = tuple(
+        _height(base, places[name].place(each.centre), -gravity / size) for name, each in compensated.items()
+    )
     numbers = [(each.gravity_compensation * each.mass * size,) for each in compensated.values()]
-    return "gravity_compensation", CONSTANT_FORCE, along, numbers
+    return "gravity_compensation", CONSTANT_FORCE, compensated, numbers, (np.zeros((len(heights), 1)), heights)
 
 
-def _height(first: Place, second: Place, axis: Array) -> TendonPath:
-    """Return the height of one point above another along an axis of the base, a unit vector."""
+def _height(first: Place, second: Place, axis: Array) -> tuple[PathTerm]:
+    """Return the height of one point above another along an axis of the base, a unit vector, as a path."""
     numbers = np.eye(len(RISE.parameters))[1]
-    piece = PathElement(RISE, numbers, (first, second), 0, pin.SE3(_upright(axis), np.zeros(3)))
-    return TendonPath(np.zeros(1), (PathTerm(piece),))
+    return (PathTerm(PathElement(RISE, numbers, (first, second), 0, pin.SE3(_upright(axis), np.zeros(3)))),)
 
 
 def _upright(axis: Array) -> Array:

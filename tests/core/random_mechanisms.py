@@ -82,9 +82,8 @@ def random_path(rng, joints):
             side = (Place(int(more.integers(0, joints + 1)), 2.0 * more.normal(size=3)),)
         frame = int(rng.integers(0, joints + 1))
         piece = PathElement(shape, np.array(numbers), (first, last, *side), frame, random_placement(rng))
-        measure = None if rng.random() < 0.5 else rng.normal()
         bends = bool(more.random() < 0.8)
-        legs.append(PathTerm(piece, arm=rng.normal(), measure=measure, follows=follows, bends=bends))
+        legs.append(PathTerm(piece, arm=rng.normal(), follows=follows, bends=bends))
     return tuple(legs)
 
 

@@ -176,3 +176,20 @@ def test_a_cord_loads_the_joints_that_its_coefficients_and_each_of_its_strands_c
     parts = tree.cord("cord").parts
     assert [(part.divisor, part.crossed) for part in parts] == [(1.0, {"block"}), (1.0, {"a"}), (1.0, {"b"})]
     assert tree.rubbing == ("cord",)
+
+
+def test_behind_a_pulley_a_branch_is_pulled_by_what_its_own_trunk_delivers():
+    """A spring and a motor pull cords of one path; both lose tension before the pulley, which halves it."""
+    halved = {"divide": {"kind": "pulley", "divisor": 2.0}, "c": point(0.0), "d": point(0.01, body="block")}
+    path = {"a": point(-0.02), "b": point(0.03, body="block")} | halved
+    block = {"body": "block", "kind": "slide", "axis": [1.0, 0.0, 0.0]}
+    trunk = {"path": path, "stiffness": STIFFNESS, "rest": [0.02, 0.02]}
+    hand = hand_of({"block": {"mass": MASS}}, {"block": block}, {"trunk": trunk}, {})
+    x = hand.rest_state([0.0])
+    state = hand.layout.unpack(x)
+    state.tendon_stiction[:], state.canal_stiction[:] = 0.25, [0.5, 0.0, 0.0]
+    found = hand.evaluate(x, [PULL + 3.0])
+    by_spring, of_spring = (found.mechanism.rows[group] for group in ("tendon_canals", "tendon_branches"))
+    stretched = STIFFNESS * (0.05 + 0.5 * 0.01 - 0.02)
+    assert by_spring.row.command == pytest.approx([stretched])
+    np.testing.assert_allclose(of_spring.row.command, [0.5 * (stretched - 0.5), 0.5 * (PULL + 3.0 - 0.25)], rtol=1e-6)

@@ -50,7 +50,7 @@ def test_cords_that_no_motor_pulls_are_drawn_branch_by_branch_with_ends_at_their
     assert list(drawn) == ["cord", "cord.1"]
     lengths = [np.linalg.norm(np.diff(points, axis=0), axis=1).sum() for points in drawn.values()]
     # Two strands for every metre of the block lengthen the cord beside its path.
-    tendon = list(hand.paths.routes).index("cord")
+    tendon = list(hand.paths.cords).index("cord")
     assert sum(lengths) == pytest.approx(float(hand.paths.length(position)[tendon]) - 2.0 * position[0], abs=1e-9)
     # Their colour is no tension's: the strand behind all others.
     assert [set(tendon["strand"]) for tendon in scene.tendons] == [{len(scene.strands)}] * 2

@@ -168,7 +168,7 @@ def linearise_paths(address: int, _time: float) -> int:
             _add_turns(structure, work, linear, index)
         for leg in range(paths.leg_start[index], paths.leg_start[index + 1]):
             e, m = paths.piece[leg], paths.column[leg]
-            weight = geometry.arm_weight[leg]
+            weight = geometry.weight[leg]
             force = weight * work.rows[ROW.force, k]
             begin, end = paths.start[e], paths.start[e + 1]
             for r in range(begin, end):

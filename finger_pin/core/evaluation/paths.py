@@ -185,7 +185,7 @@ def measure_paths(structure: Structure, parameters: Parameters, work: Work) -> N
         for leg in range(paths.leg_start[index], paths.leg_start[index + 1]):
             e, m = paths.piece[leg], paths.column[leg]
             if m == 0:
-                length += geometry.length_weight[leg] * pieces.out[e, SPAN_OUT.length]
+                length += geometry.weight[leg] * pieces.out[e, SPAN_OUT.length]
             if pieces.active[e] == 0:
                 continue
             if paths.bends[leg] and paths.columns[e] == 1:
@@ -201,8 +201,8 @@ def measure_paths(structure: Structure, parameters: Parameters, work: Work) -> N
                 gather[paths.at[r]] = dot(axes[paths.at[r]], net)
             for a in range(begin, end):
                 j = structure.arm_at[a]
-                work.arm[a] += geometry.arm_weight[leg] * gather[j]
-                work.gradient[a] += geometry.length_weight[leg] * gather[j]
+                work.arm[a] += geometry.weight[leg] * gather[j]
+                work.gradient[a] += geometry.weight[leg] * gather[j]
                 gather[j] = 0.0
         pieces.length[k], pieces.turn[k] = length, turn
 

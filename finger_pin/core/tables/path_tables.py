@@ -103,7 +103,7 @@ class PathParameters(NamedTuple):
             (entries,), m; zero where it carries both, or only turns what looks alike.
         cores: Extent of the core of a gap's first body from the middle of its two points, shape (E,), m.
         extents: Extent of the core of a gap's second body from its frame's origin, shape (E,), m.
-        arm_weight, length_weight: Of each leg, in the arm and in the length, shape (L,).
+        weight: Of each leg, in its row's arm and length, shape (L,).
     """
 
     points: Annotated[Matrix, along("piece", "x")]
@@ -114,8 +114,7 @@ class PathParameters(NamedTuple):
     motion_bounds: Annotated[Vector, along("mover")]
     cores: Annotated[Vector, along("piece")]
     extents: Annotated[Vector, along("piece")]
-    arm_weight: Annotated[Vector, along("leg")]
-    length_weight: Annotated[Vector, along("leg")]
+    weight: Annotated[Vector, along("leg")]
 
 
 class PathWork(NamedTuple):
@@ -233,8 +232,7 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> tuple[Pat
         motion_bounds=np.concatenate([np.zeros(0), *(each for each, _ in bounds)]),
         cores=np.array([half + piece.breadth for half, piece in zip(halves, pieces, strict=True)]),
         extents=np.array([piece.extent for piece in pieces], dtype=float),
-        arm_weight=np.array([leg.arm for leg in legs], dtype=float),
-        length_weight=np.array([leg.length_weight for leg in legs], dtype=float),
+        weight=np.array([leg.arm for leg in legs], dtype=float),
     )
 
 

@@ -79,7 +79,7 @@ def wound_fingers(description: FingerDescription, model: pin.Model, resolution: 
     """
     routing, fingers = Routing.from_description(description), []
     for joints, tendons in routing.fingers:
-        cords = {routing.tendons[k]: description.cord(routing.tendons[k]) for k in tendons}
+        cords = {routing.tendons[k]: routing.cords[routing.tendons[k]] for k in tendons}
         links = [link for k in joints if (link := description.joints[routing.joints[k]].link) is not None]
         base, *lengths = [float(np.linalg.norm(model.jointPlacements[1 + int(k)].translation)) for k in joints]
         if links:

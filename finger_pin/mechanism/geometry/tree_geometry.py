@@ -57,7 +57,7 @@ def _legs(description: FingerDescription, paths: TendonPaths) -> dict[str, tuple
     driven = {tendon.along: name for name, tendon in description.tendons.items() if tendon.along is not None}
     found: dict[str, tuple[Piece, ...]] = {}
     for along in (*driven, *(name for name in paths.cords if name not in driven)):
-        legs = ([paths.terms[leg].piece for leg in part.elements if leg.points] for part in paths.cords[along].parts)
+        legs = ([paths.pieces[leg] for leg in part.elements if leg.points] for part in paths.cords[along].parts)
         for number, pieces in enumerate(filter(None, legs)):
             found[branch_name(driven.get(along, along), number)] = tuple(Leg(piece) for piece in pieces)
     return found
