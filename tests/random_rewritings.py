@@ -12,6 +12,8 @@ from random_models import RandomModel
 from random_trees import any_order
 from tree_kinematics import about, body_inertia, quaternion_of, rotation_of
 
+from finger_pin.description.commands import BY_NAME
+
 #: Mirrored at y = 0.
 MIRROR = np.array([1.0, -1.0, 1.0])
 _VECTORS = ("position", "other_position", "anchor", "centre", "side", "velocity")
@@ -153,3 +155,22 @@ def gravity_turned(model: RandomModel) -> tuple[Table, Table]:
     askew["hand"]["palm"] = {"path": {name: {"offset": float(value)} for name, value in path.items()}}
     straight["hand"]["gravity"] = (turn.T @ straight["hand"]["gravity"]).tolist()
     return askew, straight
+
+
+def on_palm(model: RandomModel) -> tuple[Table, Table]:
+    """Return a tree, and a hand of which it is one finger, turned with its weight; another one is the same tree."""
+    finger, rng = model.table["finger"], model.rng(24)
+    placed = {}
+    for name in ("left", "right"):
+        angles, place = rng.uniform(-1.0, 1.0, 3), rng.uniform(-0.1, 0.1, 3)
+        placed[name] = {"finger": finger, "position": place.tolist(), "orientation": angles.tolist()}
+    roll, pitch, yaw = placed["left"]["orientation"]
+    turn = about([0, 0, 1], yaw) @ about([0, 1, 0], pitch) @ about([1, 0, 0], roll)
+    other = copy.deepcopy({key: each for key, each in model.table.items() if key != "finger"})
+    own = {key: other["controller"].pop(key) for key in BY_NAME if key in other["controller"]}
+    initial = other["simulation"].get("initial", {})
+    other["simulation"]["initial"] = {key: dict.fromkeys(placed, each) for key, each in initial.items()}
+    other["controller"]["fingers"] = dict.fromkeys(placed, own)
+    if "fingertip_force" in other["environment"]:
+        other["environment"]["fingertip_force"] = (turn @ other["environment"]["fingertip_force"]).tolist()
+    return model.table, other | {"hand": {"gravity": (turn @ finger["gravity"]).tolist(), "fingers": placed}}

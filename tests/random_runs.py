@@ -152,16 +152,17 @@ def environment_is_simulator(model: RandomModel) -> None:
         assert np.abs(seen - state.position).max() < 1e-5 * (1.0 + np.abs(seen).max())
 
 
-def _rewriting(rewrite: Callable[[RandomModel], tuple[Table, Table]]) -> Callable[[RandomModel], None]:
+def _rewriting(
+    rewrite: Callable[[RandomModel], tuple[Table, Table]], names: Callable[[str], str] = str
+) -> Callable[[RandomModel], None]:
     def door(model: RandomModel) -> None:
         one, other = rewrite(model)
-        names = rewritings.name_before if rewrite is rewritings.renamed else str
         compare(fp.simulate(tight(other)), fp.simulate(tight(one)), names)
 
     return door
 
 
-names_do_not_matter = _rewriting(rewritings.renamed)
+names_do_not_matter = _rewriting(rewritings.renamed, rewritings.name_before)
 order_does_not_matter = _rewriting(rewritings.reordered)
 mirror_image_moves_alike = _rewriting(rewritings.mirrored)
 place_in_the_world_does_not_matter = _rewriting(rewritings.turned)
@@ -169,6 +170,7 @@ welded_halves_are_one_body = _rewriting(rewritings.halved)
 numbers_may_be_written_one_by_one = _rewriting(rewritings.one_by_one)
 clock_does_not_matter = _rewriting(rewritings.later)
 palm_askew_is_weight_askew = _rewriting(rewritings.gravity_turned)
+palm_does_not_matter = _rewriting(rewritings.on_palm, "left.{}".format)
 
 
 _AT_JOINTS = {"joint_friction": {"coulomb": 0.0, "stiction": 0.0, "viscous": 0.0}}

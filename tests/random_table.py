@@ -107,4 +107,5 @@ DOORS: dict[str, Door] = {
     "linearise over a step = differences": Door(statics.step_map_is_that_of_differences, ("finger",), _NOT_HELD),
     "friction in MuJoCo's step": Door(in_mujoco.mujoco_rubs_alike, ("tree",), _NOT_RUBBING_IN_MUJOCO),
     "fit in any order": Door(statics.order_of_a_fit_does_not_matter, ("finger",), _NOT_RECORDED),
+    "on a palm = alone": Door(runs.palm_does_not_matter, ("tree",), ("fixed object", "free object", "moved object")),
 }

@@ -1,4 +1,4 @@
-"""Hands that servos, muscles, motors or nothing pull: an answer or one line, from every public function and command."""
+"""Hands that servos, muscles, motors or nothing pull, one or two: an answer or one line, from every public function."""
 
 import inspect
 import re
@@ -12,7 +12,9 @@ import pytest
 import finger_pin as fp
 from finger_pin.commands import application
 from finger_pin.description.demo_motion import demo_motion
+from finger_pin.description.finger_description import HandSettings
 from finger_pin.description.loading import read_scenario
+from finger_pin.description.validation import validate
 from finger_pin.exceptions import FingerPinError, InputError, ScenarioWarning
 from finger_pin.exchange.from_mujoco import from_mujoco
 
@@ -27,12 +29,14 @@ CORD = (
 )
 SUM = '<tendon><fixed name="f"><joint joint="j1" coef=".01"/><joint joint="j2" coef=".008"/></fixed></tendon>'
 PULL = '<motor name="m" tendon="{}" gear="-1" ctrlrange="0 5"/>'
+ON_PALM = "two on a palm"
 KINDS = {
     "nothing": "",
     "servos of joints": '<actuator><position joint="j1" kp="1" kv=".01"/><position joint="j2" kp="1"/></actuator>',
     "servo of a cord": CORD.format('<position tendon="c" kp="100" kv="1" forcerange="-20 0"/>'),
     "muscle": CORD.format('<muscle tendon="c" lengthrange=".05 .12" force="10"/>'),
     "motor of a cord": CORD.format(PULL.format("c")),
+    ON_PALM: CORD.format('<position tendon="c" kp="100" forcerange="-20 0"/><motor joint="j1" ctrlrange="-1 1"/>'),
     "motor about joints": f"{SUM}<actuator>{PULL.format('f')}</actuator>",
 }
 ROOMS = (fp, fp.analysis, fp.control, fp.learning, fp.studies, fp.views, fp.views.viewer, fp.views.plots)
@@ -120,6 +124,11 @@ def hand(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("hand")
     (folder / "hand.xml").write_text(BODIES.format(KINDS[request.param]))
     description = from_mujoco(folder / "hand.xml", "hand")
+    if request.param == ON_PALM:
+        placed = {
+            name: {"finger": description, "position": [0.0, y, 0.0]} for name, y in (("left", 0.05), ("right", 0.0))
+        }
+        description = validate(HandSettings, {"fingers": placed}, ("hand",)).joined()
     scenario = read_scenario(demo_motion(description, 0.05))
     (folder / "f.toml").write_text(fp.to_toml(description))
     (folder / "s.toml").write_text(fp.to_toml(scenario))
@@ -132,7 +141,7 @@ def hand(request, tmp_path_factory):
 def argument(name, door, hand):
     """Return what a door is given for an argument."""
     description, scenario, result, built = hand.description, hand.scenario, hand.result, hand.built
-    channels = built.mechanism.channels
+    channels, posture = built.mechanism.channels, np.resize([0.1, 0.2], len(description.joints))
     paths = {"save": "saved.nc", "write_animation": "page.html", "write_video": "film.mp4"}
     makers = {
         "candidates": lambda: {"as it is": {}},
@@ -146,7 +155,7 @@ def argument(name, door, hand):
         "first": lambda: result,
         "folder": lambda: hand.folder / "figures",
         "force": lambda: [0.0, 0.0, 0.0],
-        "forces": lambda: fp.analysis.force_polytope(description, [0.1, 0.2], 5.0),
+        "forces": lambda: fp.analysis.force_polytope(description, posture, 5.0),
         "inputs": lambda: np.zeros(channels),
         "limit": lambda: 5.0,
         "locking_map": lambda: fp.analysis.self_locking_map(description),
@@ -157,15 +166,15 @@ def argument(name, door, hand):
         "parameters": lambda: {"finger.gravity[2]": (-10.0, -9.0)},
         "path": lambda: hand.folder / paths[door],
         "point": lambda: [0.08, 0.0, -0.02],
-        "position": lambda: [0.1, 0.2],
+        "position": lambda: posture,
         "result": lambda: result,
         "results": lambda: {"one": result, "other": result},
         "scenario": lambda: scenario,
         "scenarios": lambda: [scenario],
         "second": lambda: result,
-        "simulators": lambda: [fp.Simulator(description, [0.1, 0.2])],
+        "simulators": lambda: [fp.Simulator(description, posture)],
         "speed": lambda: np.full(3, 0.01),
-        "state": lambda: built.rest_state([0.1, 0.2]),
+        "state": lambda: built.rest_state(posture),
         "tensions": lambda: np.zeros((1, channels)),
         "visualizer": lambda: pytest.importorskip("meshcat").Visualizer(window=SimpleNamespace(send=lambda sent: None)),
     }

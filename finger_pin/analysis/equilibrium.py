@@ -205,7 +205,7 @@ def _check_can_rest(finger: Finger) -> None:
         raise InputError("finger", f"{allowed}; it has {unsupported}")
     for name, actuator in description.tree.actuators.items():
         if actuator.integrates or actuator.integral:
-            raise InputError(f"finger.tree.actuators.{name}", "integrates: it rests at no input of its own")
+            raise InputError(description.entry("tree.actuators", name), "integrates: it rests at no input of its own")
 
 
 def _held_by_friction(signals: FingerSignals) -> float:

@@ -195,7 +195,7 @@ class HandController(LoopController):
         """Return the commands of all for shapes (..., n)."""
         torque, batch_shape = np.zeros_like(position), position.shape[:-1]
         tension, torque_deficit = np.zeros((*batch_shape, len(self.routing.tendons))), np.zeros_like(position)
-        limited = False
+        limited, inputs = False, list[Array]()
         for controller, (joints, tendons) in zip(self.controllers, self.routing.fingers, strict=True):
             finger_reference = ReferenceSignals(reference.position[..., joints], reference.velocity[..., joints])
             signals = controller.command(time, finger_reference, position[..., joints], velocity[..., joints])
@@ -203,7 +203,10 @@ class HandController(LoopController):
             if signals.torque_deficit is not None:
                 limited = True
                 torque_deficit[..., joints] = signals.torque_deficit
-        return ControlSignals(torque, tension, torque_deficit if limited else None)
+            if signals.inputs is not None:
+                inputs.append(signals.inputs)
+        actuated = np.concatenate(inputs, axis=-1) if inputs else None
+        return ControlSignals(torque, tension, torque_deficit if limited else None, actuated)
 
     def sense(self, readings: Mapping[str, Array], elapsed: float) -> None:
         """Pass on the readings of each finger's sensors, with the time since the last ones, s."""

@@ -26,7 +26,7 @@ def input_ranges(finger: Finger) -> tuple[Array, Array]:
         limits = actuator.reach(description.joints[actuator.joint].range if actuator.joint else None)
         if limits is None:
             raise InputError(
-                f"finger.tree.actuators.{name}.input_range",
+                f"{description.entry('tree.actuators', name)}.input_range",
                 "is missing: actions and sliders need a least and a largest",
             )
         ranges.append(limits)

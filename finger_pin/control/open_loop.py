@@ -117,8 +117,11 @@ class OpenLoopTensions(LoopController):
 
     @classmethod
     def from_fingers(cls, controllers: Sequence[OpenLoopTensions], routing: Routing) -> OpenLoopTensions:
-        """Return the schedule of a hand from those of its fingers."""
-        return cls(Signal.from_signals([each.signal for each in controllers]), routing)
+        """Return the schedule of a hand from those of its fingers: tensions of all, then inputs of all."""
+        joined = Signal.from_signals([each.signal for each in controllers])
+        are_inputs = [k >= each.routing.actuated for each in controllers for k in range(len(each.signal.harmonics))]
+        order = np.argsort(are_inputs, kind="stable")
+        return cls(Signal(joined.harmonics[order], joined.knots, joined.coefficients[..., order]), routing)
 
 
 @lru_cache

@@ -7,10 +7,10 @@ from collections.abc import Collection
 #: Tables of a controller by motor or tendon beside tensions, and their units; all of them stand for open loop.
 WINDINGS = {"spool_angle": "rad", "tendon_winding": "m", "motor_voltage": "V"}
 BY_SOURCE = ("tensions", *WINDINGS)
-#: Those with what is beside a command: the supply of a loop.
-BY_NAME = (*BY_SOURCE, "supply_voltage")
-#: The units of all commands, by their table; inputs of a tree's actuators have one of their own.
+#: The units of all commands, by their table, and of the supply of a loop; inputs of a tree's actuators have their own.
 COMMANDS = {"tensions": "N", **WINDINGS, "supply_voltage": "V", "inputs": ""}
+#: All of these tables.
+BY_NAME = tuple(COMMANDS)
 
 
 def command_place(name: str, inputs: Collection[str]) -> tuple[str, str]:

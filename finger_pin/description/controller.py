@@ -147,7 +147,7 @@ class ControllerSettings(Description):
     supply_voltage: dict[FullName, VoltageSignal] | None = Field(
         None, description="By motor in position drive: what its loop takes a part of, in place of the motor's voltage."
     )
-    inputs: dict[Name, InputSignal] | None = Field(
+    inputs: dict[FullName, InputSignal] | None = Field(
         None, description="By actuator of a tree; one without a signal has zero input."
     )
     gain: Annotated[Numbers, reals(0.0, 1e6)] = quantity(

@@ -22,10 +22,10 @@ def demo_motion(description: FingerDescription, duration: float = 4.0) -> dict[s
     one actuator to the next, as in a wave.
 
     Args:
-        description: With a tree.
+        description: With a tree, or a hand of trees.
         duration: s.
     """
-    tree = description.tree
+    tree, kind = description.tree, "hand" if description.hand is not None else "finger"
     count = len(tree.actuators) + len(description.actuated_names)
     phases = iter(range(count))
 
@@ -36,7 +36,7 @@ def demo_motion(description: FingerDescription, duration: float = 4.0) -> dict[s
     return {
         "name": description.name,
         "title": f"{description.name}: {'every actuator to and fro' if count else 'it falls, as nothing drives it'}",
-        "finger": description.model_dump(mode="python", exclude_none=True),
+        kind: (description.hand or description).model_dump(mode="python", exclude_none=True),
         "controller": {
             "kind": "tensions",
             "tensions": {name: swing(_TENSION, 0.5 * _TENSION) for name in description.actuated_names},

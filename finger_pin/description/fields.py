@@ -21,6 +21,12 @@ def find_field(model: type[BaseModel], location: Sequence[str]) -> FieldInfo | N
     return field
 
 
+def unit_of(field: FieldInfo | None) -> str:
+    """Return the unit of a field, empty where it has none."""
+    extra = field.json_schema_extra if field is not None else None
+    return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+
+
 def _model_at(model: type[BaseModel], location: Iterable[str]) -> Any:
     """Return what is at a location, a model if there is one; for a table of models, a dictionary that says so."""
     found: Any = model

@@ -133,9 +133,9 @@ class FingerDescription(Description):
         Raises:
             InputError: If a joint has neither a body nor a link, or the name of something else of a finger.
         """
-        if self.hand is not None:
-            return self.hand.bodies
-        return self.tree if self.tree.bodies else tree_of_links(self.joints, self.tendons)
+        if self.tree.bodies:
+            return self.tree
+        return tree_of_links(self.joints, self.tendons) if self.hand is None else self.hand.bodies
 
     # Read once: routing, rows, drawing and export ask for it.
     @memoised(lambda self, name: (name, self.tendon_friction.place, self.tendons.get(name), self.tree), most=256)
@@ -171,6 +171,11 @@ class FingerDescription(Description):
         """The palm and its fingers, None for a finger alone."""
         return self._hand
 
+    def entry(self, table: str, name: str) -> str:
+        """Return the key of an entry of a table, as in ``finger.tree.joints.NAME``; in a hand that of its finger."""
+        finger, _, own = name.partition(".")
+        return f"finger.{table}.{name}" if self.hand is None else f"hand.fingers.{finger}.finger.{table}.{own}"
+
     @property
     def bearings(self) -> tuple[bool, ...]:
         """Whether each joint is a pin or a guide that rubs."""
@@ -200,15 +205,7 @@ class FingerDescription(Description):
 class PlacedFinger(Description):
     """A finger and the place of its base frame on the palm."""
 
-    finger: FingerDescription = Field(description="Name of one that ships, path of a .toml file, or a table.")
-
-    @field_validator("finger")
-    @classmethod
-    def _made_of_links(cls, value: FingerDescription) -> FingerDescription:
-        if value.tree.bodies:
-            raise problem("tree", "a tree of bodies cannot be placed on a palm; it is a hand of its own")
-        return value
-
+    finger: FingerDescription = Field(description="Name of one that ships, path of a file, or a table: links or tree.")
     position: Annotated[tuple[float, float, float], PALM_POINT] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its base frame, in the palm's frame."
     )
@@ -218,6 +215,12 @@ class PlacedFinger(Description):
     scale: Annotated[float, real(0.1, 10.0)] = quantity(
         1.0, unit="1", source="design", doc="All lengths times this, masses times its third power."
     )
+
+    @model_validator(mode="after")
+    def _fits_palm(self) -> Self:
+        for name in self.finger.tree.objects:
+            raise problem(f"finger.tree.objects.{name}", "is no part of a finger: put it into environment.objects")
+        return self
 
     @property
     def rotation(self) -> Array:
@@ -265,6 +268,10 @@ class HandSettings(Description):
     @model_validator(mode="after")
     def _acting(self) -> Self:
         refuse_idle(self, OF_HAND)
+        for name, placed in self.fingers.items() if self.palm.path else ():
+            for joint in placed.finger.tree.on_paths:
+                entry = f"fingers.{name}.finger.tree.joints.{joint}.path"
+                raise problem(entry, "is for a palm at rest; leave out hand.palm.path")
         return self
 
     def built(self) -> dict[str, FingerDescription]:
@@ -280,7 +287,8 @@ class HandSettings(Description):
 
     def joined(self) -> FingerDescription:
         """Return all fingers together: joints finger by finger; the actuated tendons of all, then the passive ones."""
-        joined = self._put_together().model_copy()
+        is_tree = any(placed.finger.tree.bodies for placed in self.fingers.values())
+        joined = self._put_together().model_copy(update={"tree": self.bodies} if is_tree else None)
         joined._hand = self
         return joined
 

@@ -1,4 +1,4 @@
-"""Links as bodies: the tree that a finger of links, or a hand of such fingers, is made of.
+"""The tree of bodies that a finger of links, or a hand of fingers of links or bodies, is made of.
 
 Frames are those of (1): a link starts at its joint, whose axis is z, and runs along x, its ``offset`` along the axis
 away. A link touches as a capsule as wide as it is, from its joint to the next; the last one ends in the pad. Solids
@@ -8,7 +8,7 @@ follow from the sizes of links and the radii of tendons, so that a finger of oth
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 from finger_pin.description.caching import memoised
@@ -16,7 +16,8 @@ from finger_pin.description.parameters import Joint, Link, Tendon
 from finger_pin.description.primitives import Triple
 from finger_pin.description.surface import BodyShape
 from finger_pin.description.tree import Tree
-from finger_pin.description.tree_parts import Body, Tip, TreeJoint, TreeSolid
+from finger_pin.description.tree_parts import Body, Keyframe, Tip, TreeJoint, TreeSolid
+from finger_pin.description.waypoints import SidePoint
 from finger_pin.exceptions import InputError
 
 #: Bodies without joints at both ends of a finger of links.
@@ -85,6 +86,13 @@ def tree_of_links(joints: Mapping[str, Joint], tendons: Mapping[str, Tendon]) ->
     return Tree.model_construct(bodies=bodies, joints=hinges, tip=Tip.model_construct(body=TIP))
 
 
+def is_base(tree: Tree, name: str) -> bool:
+    """Return whether a body is the base itself: fixed on it, in its place."""
+    body = tree.bodies[name]
+    is_placed = any(body.position) or any(body.orientation[:3])
+    return body.parent is None and not is_placed and not tree.joints_of(name)
+
+
 @memoised(lambda trees, places, size, centre: (*trees, *trees.values(), *places.values(), size, centre))
 def placed_on_palm(
     trees: Mapping[str, Tree],
@@ -92,7 +100,10 @@ def placed_on_palm(
     size: Triple,
     centre: Triple,
 ) -> Tree:
-    """Return the bodies of several fingers of links on one base, whose names begin with that of their finger and a dot.
+    """Return the trees of several fingers as one, on one base; names begin with that of their finger and a dot.
+
+    The base of a finger is the body that stands there alone, or else a body of its own, ``<finger>_mount``. A keyframe
+    of a finger has the first ones of the others.
 
     Args:
         trees: By finger.
@@ -100,26 +111,96 @@ def placed_on_palm(
         size: Sides of the palm's box, m; none is drawn if one is zero.
         centre: Of the box, m.
     """
-    bodies, joints, tips = {}, {}, {}
+    joined: dict[str, Any] = {group: {} for group in _TABLES}
     if all(size):
         box = _solid("palm", kind="box", sides=size, position=centre)
-        bodies["palm"] = Body.model_construct(solids={"palm": box})
+        joined["bodies"]["palm"] = Body.model_construct(solids={"palm": box})
+    keyframes: dict[str, dict[str, Keyframe]] = {}
     for finger, tree in trees.items():
-        for name, body in tree.bodies.items():
-            entries: dict[str, Any] = {
-                part: {f"{finger}.{key}": each for key, each in getattr(body, part).items()}
-                for part in ("solids", "shapes")
-            }
-            if body.parent is None:
-                entries["position"], entries["orientation"] = places[finger]
-            else:
-                entries["parent"] = f"{finger}.{body.parent}"
-            bodies[f"{finger}.{name}"] = body.updated(**entries)
-        for name, joint in tree.joints.items():
-            joints[f"{finger}.{name}"] = joint.updated(body=f"{finger}.{joint.body}")
-        for name, tip in tree.fingertips.items():
-            tips[".".join(filter(None, (finger, name)))] = tip.updated(body=f"{finger}.{tip.body}")
-    return Tree.model_construct(bodies=bodies, joints=joints, tips=tips)
+        roots = [name for name, body in tree.bodies.items() if body.parent is None]
+        alone = len(roots) == 1 and is_base(tree, roots[0])
+        base = f"{finger}.{roots[0]}" if alone else f"{finger}_mount"
+        tables = _named_in_hand(tree, finger, base)
+        position, orientation = places[finger]
+        stand = tables["bodies"].pop(base, None) or Body.model_construct()
+        stand = stand.updated(parent=None, position=position, orientation=orientation)
+        tables["bodies"] = {base: stand, **tables["bodies"]}
+        for group, table in tables.items():
+            joined[group].update(table)
+        keyframes[finger] = tables["keyframes"]
+    joined["keyframes"] = _of_all(keyframes)
+    touching = tuple(
+        (f"{finger}.{one}", f"{finger}.{two}") for finger, tree in trees.items() for one, two in tree.touching
+    )
+    left_out = tuple(dict.fromkeys(line for tree in trees.values() for line in tree.left_out))
+    return Tree.model_construct(**joined, touching=touching, left_out=left_out)
+
+
+# Tables of a tree whose names those of a hand are made of.
+_TABLES = ("bodies", "joints", "tendons", "couplings", "loops", "actuators", "keyframes", "tips", "meshes")
+
+
+def _named_in_hand(tree: Tree, finger: str, base: str) -> dict[str, dict[str, Any]]:
+    """Return the tables of a tree with the names of a hand; what is on the base is on a body."""
+
+    def named(name: str | None) -> str | None:
+        return name and f"{finger}.{name}"
+
+    def on_body(name: str | None) -> str:
+        return f"{finger}.{name}" if name else base
+
+    def keyed(table: Mapping[str, Any] | None, **entries: Callable[[Any], Any]) -> dict[str, Any]:
+        return {
+            f"{finger}.{key}": each.updated(**{entry: name(getattr(each, entry)) for entry, name in entries.items()})
+            if entries
+            else each
+            for key, each in (table or {}).items()
+        }
+
+    def solids(table: Mapping[str, TreeSolid]) -> dict[str, TreeSolid]:
+        return {
+            f"{finger}.{key}": each if each.mesh is None else each.updated(mesh=named(each.mesh))
+            for key, each in table.items()
+        }
+
+    def side(point: SidePoint | None) -> SidePoint | None:
+        return point and point.updated(body=on_body(point.body))
+
+    return {
+        "bodies": keyed(tree.bodies, parent=on_body, solids=solids, shapes=keyed),
+        "joints": keyed(tree.joints, body=on_body),
+        "tendons": keyed(
+            tree.tendons,
+            joints=lambda gains: gains and keyed(gains),
+            path=lambda path: path and keyed(path, body=on_body, side_point=side),
+        ),
+        "couplings": keyed(tree.couplings, joint=named, other=named),
+        "loops": keyed(tree.loops, body=on_body, other=on_body),
+        "actuators": keyed(tree.actuators, joint=named, tendon=named),
+        "keyframes": keyed(tree.keyframes, position=keyed, velocity=keyed, inputs=keyed),
+        "tips": {
+            ".".join(filter(None, (finger, name))): tip.updated(body=on_body(tip.body))
+            for name, tip in tree.fingertips.items()
+        },
+        "meshes": keyed(tree.meshes),
+    }
+
+
+def _of_all(keyframes: Mapping[str, Mapping[str, Keyframe]]) -> dict[str, Keyframe]:
+    """Return the keyframes of all fingers, each with the first ones of the others."""
+    firsts = {finger: next(iter(table.values())) for finger, table in keyframes.items() if table}
+    joined = {}
+    for finger, table in keyframes.items():
+        for name, keyframe in table.items():
+            postures = (firsts | {finger: keyframe}).values()
+            entries = ("position", "velocity", "inputs")
+            joined[name] = keyframe.updated(
+                **{
+                    entry: {key: value for each in postures for key, value in getattr(each, entry).items()}
+                    for entry in entries
+                }
+            )
+    return joined
 
 
 class _Capsule(BodyShape):

@@ -12,8 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from finger_pin.description.actuators import Actuator
 from finger_pin.description.caching import memoised
-from finger_pin.description.friction import JointFrictionSettings
-from finger_pin.description.parameters import Joint, Link, Tendon, per_item
+from finger_pin.description.fields import unit_of
+from finger_pin.description.meshes import Mesh
+from finger_pin.description.parameters import Tendon, per_item
 from finger_pin.description.signals import Samples, SignalSettings, signal_field
 from finger_pin.description.tables import series
 from finger_pin.description.validation import (
@@ -54,35 +55,79 @@ def quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, flo
     return x, y, z, w
 
 
-# Joints or tendons of hands whose copies are remembered.
+# Parts of fingers whose copies are remembered.
 _MOST_PARTS = 256
-# Powers of the scale that a link's numbers go with.
-_POWERS = {"length": 1, "offset": 1, "width": 1, "centre_of_mass": 1, "mass": 3}
-_POWERS |= {"transverse_inertia": 5, "axial_inertia": 5}
+# Powers of the scale that numbers go with, by their unit.
+_POWERS = {"m": 1, "m/rad": 1, "kg": 3, "kg m2": 5}
 
 
-def _scaled_link(link: Link, scale: float) -> Link:
-    return link.model_copy(update={key: getattr(link, key) * scale**power for key, power in _POWERS.items()})
+@lru_cache
+def _sized_entries(model: type[Description]) -> dict[str, int]:
+    """Return the powers of the entries of a description that have a size, and 0 of those that may have one inside."""
+    units = {key: unit_of(field) for key, field in model.model_fields.items()}
+    return {key: _POWERS.get(unit, 0) for key, unit in units.items() if unit in _POWERS or not unit}
+
+
+def _resized(value: Any, scale: float, power: int = 0) -> Any:
+    """Return a value in another size: a number by a power of the scale, and what is in it by its units."""
+    if isinstance(value, float):
+        return value * scale**power
+    if isinstance(value, Mesh):
+        points, faces = value.unpacked()
+        return value.updated(**Mesh.packed(scale * points, faces.astype(np.int32)))
+    if isinstance(value, Description):
+        powers = _sized_entries(type(value)).items()
+        return value.updated(**{key: _resized(getattr(value, key), scale, power) for key, power in powers})
+    if isinstance(value, dict):
+        return {key: _resized(each, scale, power) for key, each in value.items()}
+    return tuple([each * scale**power for each in value]) if power and value else value
 
 
 # The same parts whenever their numbers are the same: routing, bodies and paths are found again by their parts.
-@memoised(lambda tendon, scale: (tendon, scale), most=_MOST_PARTS)
-def _scaled_tendon(tendon: Tendon, scale: float) -> Tendon:
-    crossings = {
-        joint: crossing.updated(radius=crossing.radius * scale) for joint, crossing in tendon.crossings.items()
-    }
-    return tendon.updated(crossings=crossings)
+@memoised(lambda part, scale: (part, scale), most=_MOST_PARTS)
+def _scaled(part: Any, scale: float) -> Any:
+    return _resized(part, scale)
 
 
-@memoised(lambda joint, scale: (joint, scale), most=_MOST_PARTS)
-def _scaled_joint(joint: Joint, scale: float) -> Joint:
-    return joint.updated(link=joint.link and _scaled_link(joint.link, scale))
+@memoised(lambda tree, scale: (tree, scale))
+def _scaled_tree(tree: Any, scale: float) -> Any:
+    """Return a tree in another size, whose positions of joints that slide are lengths."""
+    scaled, grown = _resized(tree, scale), {}
+    for name, described in tree.joints.items():
+        grown[name] = scale if described.kind == "slide" else 1.0
 
+    def positions(values: Mapping[str, float]) -> dict[str, float]:
+        return {name: grown[name] * value for name, value in values.items()}
 
-@memoised(lambda friction, joints, scale: (friction, joints, scale))
-def _scaled_friction(friction: JointFrictionSettings, joints: int, scale: float) -> JointFrictionSettings:
-    numbers = per_item(friction, joints)
-    return friction.updated(**{key: tuple((scale * numbers[key]).tolist()) for key in ("coulomb", "stiction")})
+    def joint(name: str, each: Any) -> Any:
+        size, sizes = grown[name], ("offset", "amplitude", "height", "values")
+        path = each.path and each.path.updated(**{key: _resized(getattr(each.path, key), size, 1) for key in sizes})
+        return each.updated(reference=size * each.reference, armature=each.armature / size**2, path=path)
+
+    def coupling(each: Any) -> Any:
+        of_joint, of_other = grown[each.joint], grown.get(each.other, 1.0)
+        powers = tuple(value * of_joint / of_other**power for power, value in enumerate(each.higher, 2))
+        rolling = each.rolling and (each.rolling[0] * of_other, each.rolling[1] * of_joint)
+        linear = {"ratio": each.ratio * of_joint / of_other, "offset": each.offset * of_joint}
+        return each.updated(powers=powers, rolling=rolling, **linear)
+
+    return scaled.updated(
+        joints={name: joint(name, each) for name, each in scaled.joints.items()},
+        tendons={
+            name: each.updated(joints=each.joints and {key: gain / grown[key] for key, gain in each.joints.items()})
+            for name, each in scaled.tendons.items()
+        },
+        couplings={name: coupling(each) for name, each in scaled.couplings.items()},
+        keyframes={
+            name: each.updated(position=positions(each.position), velocity=positions(each.velocity))
+            for name, each in tree.keyframes.items()
+        },
+        # The length of a muscle about a hinge is an angle.
+        actuators={
+            name: tree.actuators[name] if grown.get(each.joint) == 1.0 else each
+            for name, each in scaled.actuators.items()
+        },
+    )
 
 
 def scaled(finger: _Finger, scale: float) -> _Finger:
@@ -90,15 +135,29 @@ def scaled(finger: _Finger, scale: float) -> _Finger:
 
     Lengths and radii go with the scale, masses with its third power and moments of inertia with its fifth; so do the
     friction coefficients of joints, which are lengths (coefficient times pin radius). Springs, tendons, actuators and
-    limiters stay as they are.
+    limiters stay as they are, but for lengths of a tree's tendons. Positions and ranges of joints that slide are
+    lengths, and their friction coefficients are none.
     """
     if scale == 1.0:
         return finger
     tables: Any = finger
-    joints = {name: _scaled_joint(joint, scale) for name, joint in tables.joints.items()}
-    tendons = {name: _scaled_tendon(tendon, scale) for name, tendon in tables.tendons.items()}
-    friction = _scaled_friction(tables.joint_friction, len(joints), scale)
-    return finger.updated(joints=joints, tendons=tendons, joint_friction=friction)
+    tree, joints = tables.tree, {name: _scaled(joint, scale) for name, joint in tables.joints.items()}
+    tendons = {name: _scaled(tendon, scale) for name, tendon in tables.tendons.items()}
+    friction = _scaled(tables.joint_friction, scale)
+    if not tree.bodies:
+        return finger.updated(joints=joints, tendons=tendons, joint_friction=friction)
+    for name in (slides := [name for name, joint in tree.joints.items() if joint.kind == "slide"]):
+        spring = joints[name].spring
+        joints[name] = joints[name].updated(
+            range=tuple(scale * end for end in joints[name].range),
+            spring=spring and spring.updated(rest=scale * spring.rest),
+        )
+    if slides:
+        numbers, is_slide = per_item(tables.joint_friction, len(joints)), [name in slides for name in joints]
+        lengths = {key: np.where(is_slide, 1.0, scale) * numbers[key] for key in ("coulomb", "stiction")}
+        friction = friction.updated(**{key: tuple(each.tolist()) for key, each in lengths.items()})
+    tree = _scaled_tree(tree, scale)
+    return finger.updated(joints=joints, tendons=tendons, joint_friction=friction, tree=tree)
 
 
 @memoised(lambda name, placed, gravity: (name, placed, gravity))
@@ -139,8 +198,9 @@ def joined_entries(hand: Any, parts: Mapping[str, Any]) -> dict[str, Any]:
 
 @memoised(lambda finger, tendon: (finger, tendon), most=_MOST_PARTS)
 def _tendon_of_hand(finger: str, tendon: Tendon) -> Tendon:
-    """Return a tendon whose crossings are of the joints of a hand."""
-    return tendon.updated(crossings={f"{finger}.{name}": each for name, each in tendon.crossings.items()})
+    """Return a tendon whose joints, or the tendon of a tree that it takes the path of, are those of a hand."""
+    crossings = {f"{finger}.{name}": each for name, each in tendon.crossings.items()}
+    return tendon.updated(crossings=crossings, along=tendon.along and f"{finger}.{tendon.along}")
 
 
 def _actuator_of_hand(finger: str, actuator: Actuator) -> Actuator:
@@ -149,9 +209,9 @@ def _actuator_of_hand(finger: str, actuator: Actuator) -> Actuator:
 
 
 def _kinds(part: Any, group: str) -> tuple[str, ...]:
-    """Return the kinds by which the numbers of a table are ordered: actuated tendons of all before passive ones."""
+    """Return the kinds that order the numbers of a table: actuated tendons of all, passive ones, cords of trees."""
     if group == "tendon_friction":
-        return tuple(tendon.kind for tendon in part.tendons.values())
+        return (*(tendon.kind for tendon in part.tendons.values()), *["tree"] * len(part.canals))
     return ("",) * len(part.passive_names if group == "passive_tendon" else part.joints)
 
 

@@ -160,13 +160,13 @@ def _merge_hand(base: Table, hand: Table, folder: Path) -> Table:
         if isinstance(placed, str) and placed != INHERIT_NOTHING:
             placed = {"finger": placed}
         finger = as_table(placed).get("finger")
-        if not _replaces(finger):
+        if not isinstance(finger, str | dict):
             continue
         try:
             fingers = fingers | {name: {**placed, "finger": resolve("finger", finger, folder)}}
         except InputError as error:
             raise InputError(f"hand.fingers.{name}.{error.entry}", error.allowed, error.value) from None
-        if name in inherited:
+        if _replaces(finger) and name in inherited:
             inherited = inherited | {name: without(as_table(inherited[name]), "finger")}
     return merge(base | {"fingers": inherited} if inherited else base, hand | {"fingers": fingers} if fingers else hand)
 

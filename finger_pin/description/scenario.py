@@ -169,10 +169,9 @@ class Scenario(Description):
         return {name: self._part(name) for name in fingers}
 
     def environments(self) -> dict[str, EnvironmentSettings]:
-        """Return the environments of a hand's fingers or a tree's tips, by name; of a single one under no name."""
-        shared = self.environment
-        names = self.finger.tree.tip_names if self.hand is None else tuple(self.hand.fingers)
-        return {name: settings_of_finger(shared, name) for name in names} or {"": shared}
+        """Return the environments of a hand's fingers, or all tips of trees, by name; of a single one under no name."""
+        shared, names = self.environment, self.finger.tree.tip_names or (self.hand.fingers if self.hand else ())
+        return {name: settings_of_finger(shared, name.partition(".")[0]) for name in names} or {"": shared}
 
     def _part(self, name: str) -> Scenario:
         assert self.hand is not None
@@ -193,7 +192,8 @@ class Scenario(Description):
         simulation, initial = self.simulation, self.simulation.initial
         if initial is not None:
             start = {entry: entries_of_finger(getattr(initial, entry)) for entry in ("position", "velocity")}
-            simulation = simulation.updated(initial=start)
+            keyframe = next(iter(entries_of_finger({initial.keyframe or "": None})), None)
+            simulation = simulation.updated(initial={**start, "keyframe": keyframe})
         return self.updated(
             finger=alone.joined(),
             hand=alone,

@@ -15,7 +15,6 @@ from finger_pin.description.validation import (
     MOST_ANGLE,
     Description,
     FullName,
-    Name,
     choice,
     problem,
     quantity,
@@ -38,7 +37,7 @@ class InitialSettings(Description):
     velocity: dict[FullName, Annotated[float, real(-1e4, 1e4)]] = quantity(
         {}, unit="rad/s", source="chosen", doc="theta'(0) by joint; a joint left out starts at rest."
     )
-    keyframe: Name | None = Field(
+    keyframe: FullName | None = Field(
         None, description="Of a tree, the posture that it starts from, below position; by default its first, if any."
     )
 

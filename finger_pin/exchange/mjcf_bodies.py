@@ -99,7 +99,7 @@ class BodyWriter:
         on_paths = [key for key in joints if key in self.tree.on_paths]
         if on_paths and (body.parent is not None or on_paths != joints):
             allowed = "is not written: a mocap body of MuJoCo stands in the world, and all of its joints have paths"
-            raise InputError(f"finger.tree.joints.{on_paths[0]}.path", allowed)
+            raise InputError(f"{self.description.entry('tree.joints', on_paths[0])}.path", allowed)
         return bool(on_paths)
 
     def _joint(self, k: int, name: str) -> dict[str, str]:

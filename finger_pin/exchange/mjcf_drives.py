@@ -43,7 +43,7 @@ def add_equalities(
         joints = [coupling.joint, *([coupling.other] if coupling.other else [])]
         softness = soft(coupling.stiffness, coupling.damping, sum(mobility.joints[joint] for joint in joints))
         joint_names = {f"joint{k + 1}": joint for k, joint in enumerate(joints)}
-        polynomial = _polynomial(f"finger.tree.couplings.{name}.powers", coupling, description)
+        polynomial = _polynomial(f"{description.entry('tree.couplings', name)}.powers", coupling, description)
         ET.SubElement(table, "joint", {"name": name, **joint_names, "polycoef": numbers(*polynomial), **softness})
     for name, loop in tree.loops.items():
         ends = ((loop.body, loop.position), (loop.other, loop.other_position))
@@ -67,7 +67,7 @@ def add_actuators(root: ET.Element, description: FingerDescription, step: float)
     """Add the motors of tendons that ideal sources pull, and the actuators of a tree, for a time step, s."""
     table = ET.SubElement(root, "actuator")
     for name, tendon in description.tendons.items():
-        entry = f"finger.tendons.{name}"
+        entry = description.entry("tendons", name)
         if tendon.kind == "passive" or tendon.winch is not None:
             key = "winch" if tendon.winch else "kind"
             raise InputError(f"{entry}.{key}", "is not written: a tendon beside a tree is pulled by an ideal source")
@@ -80,7 +80,7 @@ def add_actuators(root: ET.Element, description: FingerDescription, step: float)
         if actuator.delay:
             samples = math.ceil(actuator.delay / min(step, _DELAY_STEP)) + 2
             attributes |= {"delay": numbers(actuator.delay), "nsample": str(samples)}
-        kind, law = _law(f"finger.tree.actuators.{name}", actuator)
+        kind, law = _law(description.entry("tree.actuators", name), actuator)
         ET.SubElement(table, kind, attributes | law)
 
 

@@ -125,7 +125,7 @@ class _Writer(BodyWriter):
     def _add_tendon(self, table: ET.Element, name: str, tendon: TreeTendon) -> None:
         if tendon.path is not None and any((tendon.joints or {}).values()):
             allowed = "is not written: a tendon of MuJoCo has joints or a path"
-            raise InputError(f"finger.tree.tendons.{name}.joints", allowed)
+            raise InputError(f"{self.description.entry('tree.tendons', name)}.joints", allowed)
         rest = tendon.rest
         if tendon.slack is not None:
             rest = (-1e3, float(self.paths.reference_lengths[name]) + tendon.slack)

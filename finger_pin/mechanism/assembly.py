@@ -239,4 +239,6 @@ def _warn_of_turns(description: FingerDescription) -> None:
         joint, hinge = description.joints[coupling.other], description.tree.joints[coupling.other].kind == "hinge"
         if hinge and not (joint.limited and np.ptp(joint.range) <= 2.0 * math.pi):
             warning = f"repeat where {coupling.other} turns by more than half a turn from its range's middle; limit it"
-            warnings.warn(ScenarioWarning(f"finger.tree.couplings.{name}.powers: {warning}"), stacklevel=4)
+            warnings.warn(
+                ScenarioWarning(f"{description.entry('tree.couplings', name)}.powers: {warning}"), stacklevel=4
+            )

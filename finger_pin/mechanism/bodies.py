@@ -57,7 +57,7 @@ def place_bodies(description: FingerDescription) -> tuple[RigidBody, Mapping[str
         body.topology = _form(tree)
     for name, moment in zip(tree.joints, np.diag(body.mass_matrix(pin.neutral(model))), strict=True):
         if not moment > 0.0:
-            raise InputError(f"finger.tree.joints.{name}", "moves nothing that has mass or inertia")
+            raise InputError(description.entry("tree.joints", name), "moves nothing that has mass or inertia")
     return body, placed
 
 

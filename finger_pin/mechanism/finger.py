@@ -140,7 +140,7 @@ class Finger:
         """
         if self.mechanism.moved or np.any(self.mechanism.prescribed >= 0):
             joints_led = next(iter(self.description.tree.on_paths), None)
-            entry = f"finger.tree.joints.{joints_led}.path" if joints_led else "environment.objects"
+            entry = f"{self.description.entry('tree.joints', joints_led)}.path" if joints_led else "environment.objects"
             entry = "hand.palm.path" if self.mechanism.moved else entry
             raise InputError(entry, "a path cannot stand beside a motion of the joints that is given: leave it out")
         finger = copy.copy(self)

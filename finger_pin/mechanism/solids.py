@@ -113,7 +113,7 @@ def pairs_within(description: FingerDescription) -> set[frozenset[str]]:
         if finger.touches_itself:
             names = [prefix + name for name in finger.links]
             pairs |= {frozenset((names[i], names[k])) for k in range(len(names)) for i in range(k - 1)}
-            pairs |= {frozenset(pair) for pair in finger.tree.touching}
+            pairs |= {frozenset(prefix + name for name in pair) for pair in finger.tree.touching}
     return pairs
 
 

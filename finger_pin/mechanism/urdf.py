@@ -9,11 +9,10 @@ import numpy as np
 import pinocchio as pin
 
 from finger_pin.description.finger_description import FingerDescription
-from finger_pin.description.links import BASE, TIP
+from finger_pin.description.links import BASE, TIP, is_base
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.surface import BodyShape
-from finger_pin.description.tree import Tree
 from finger_pin.description.tree_parts import MATERIALS, Body, Coupling, TreeJoint, TreeSolid
 from finger_pin.mechanism.body_places import joint_placement, rotation
 from finger_pin.mechanism.xml_numbers import numbers as _numbers
@@ -64,7 +63,7 @@ def to_urdf(description: DescriptionLike | Scenario, drawn: bool = True) -> str:
         if material in used:
             ET.SubElement(ET.SubElement(root, "material", name=material), "color", rgba=_numbers(*colour))
     base = BASE
-    while base in tree.bodies and not _is_base(tree, base):
+    while base in tree.bodies and not is_base(tree, base):
         base += "_"
     if base not in tree.bodies:
         _add_massless_link(root, base)
@@ -117,13 +116,6 @@ def _notes(description: FingerDescription) -> str:
     left_out = (*description.tree.left_out, *[asymmetry] * is_asymmetric)
     rest = "".join(f"\n  - {line}" for line in left_out)
     return _NOTES.format(title=description.title or description.name, rest=rest).replace("--", "- -")
-
-
-def _is_base(tree: Tree, name: str) -> bool:
-    """Return whether a body is the base itself: fixed on it, in its place."""
-    body = tree.bodies[name]
-    is_placed = any(body.position) or any(body.orientation[:3])
-    return body.parent is None and not is_placed and not tree.joints_of(name)
 
 
 def _kind(description: FingerDescription, joint: str, moved: TreeJoint) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
 from typing import Annotated, Any
@@ -73,7 +74,7 @@ def friction_keys(description: FingerDescription) -> tuple[dict[str, dict[str, A
             turns = {element.name: element.turn for element in cord.elements if element.turn}
             if set(turns.values()) - {1.0}:
                 allowed = "must be 1 rad per rad in MuJoCo; or leave out friction"
-                raise InputError(f"finger.tendons.{name}: turn over its joints", allowed, turns)
+                raise InputError(f"{description.entry('tendons', name)}: turn over its joints", allowed, turns)
             keys |= {"bends": tuple(turns)}
         loss = description.tree.tendons[written].friction if written in description.tree.tendons else 0.0
         tendons[written] = keys | {"drag": max(keys["drag"] - loss, 0.0)}
@@ -88,5 +89,6 @@ def friction_keys(description: FingerDescription) -> tuple[dict[str, dict[str, A
 
 def _values_at(settings: TendonFrictionSettings | JointFrictionSettings, index: int, count: int) -> dict[str, Any]:
     """Return the numbers of one of several tendons or joints."""
-    numbers = per_item(settings, count)
-    return {key: float(values[index]) for key, values in numbers.items() if key != "reversal_speed"}
+    # In a hand some fingers may have no stiffness.
+    numbers = {key: float(values[index]) for key, values in per_item(settings, count).items()}
+    return {key: value for key, value in numbers.items() if key != "reversal_speed" and not math.isnan(value)}

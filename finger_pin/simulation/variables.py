@@ -182,7 +182,7 @@ def variables(loop: ClosedLoop) -> dict[str, Quantity]:
     """Return all variables that a result of a loop can have, by name."""
     finger = loop.finger
     table = {name: each for section in RUN_SECTIONS if section.holds(loop) for name, each in section.signals.items()}
-    tips = ("tip",) if finger.description.tree.tip_names else ("finger",)
+    tips = ("tip",) if _tip_names(loop) else ("finger",)
     dims = (*(tips if len(finger.rigid_body.tips) > 1 else ()), "axis")
     table |= {name: each._replace(dims=dims) for name, each in table.items() if each.dims == _TIP}
     return finger.signal_table | table | _sensor_variables(loop) | _account_variables(loop)
@@ -231,6 +231,12 @@ def _account_variables(loop: ClosedLoop) -> dict[str, Quantity]:
     return table | {RESIDUAL: _of_run((), "J", text, attrgetter("account.residual"))}
 
 
+def _tip_names(loop: ClosedLoop) -> tuple[str, ...]:
+    """Return the names of the fingertips of a tree; none where a hand's fingers have one each."""
+    tips, hand = loop.finger.description.tree.tip_names, loop.finger.description.hand
+    return tips if hand is None or tips != tuple(hand.fingers) else ()
+
+
 def coordinates(scenario: Scenario, loop: ClosedLoop, times: Array) -> dict[str, Any]:
     """Return the coordinates of a result."""
     routing, finger = loop.finger.routing, loop.finger
@@ -245,7 +251,7 @@ def coordinates(scenario: Scenario, loop: ClosedLoop, times: Array) -> dict[str,
     labels |= {each.dimension: list(each.labels) for each in loop.controller.sensors if each.labels}
     if scenario.hand is not None and len(scenario.hand.fingers) > 1:
         labels["finger"] = list(scenario.hand.fingers)
-    if tips := finger.description.tree.tip_names:
+    if tips := _tip_names(loop):
         labels["tip"] = ("tip", list(tips), {"long_name": "fingertip"})
     if finger.wraps:
         labels["wrap"] = ("wrap", list(finger.wrap_names), {"long_name": "bend of a tendon"})

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from finger_pin.description.fields import find_field
+from finger_pin.description.fields import find_field, unit_of
 from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, load_scenario
 from finger_pin.description.scenario import Scenario
 from finger_pin.description.tables import Series, split
@@ -121,11 +121,9 @@ def describe(key: str) -> dict[str, str]:
     root, *path = parts = name.split(".")
     # In a hand, each finger has a table of joints.
     field = find_field(Scenario, parts) or find_field(Scenario, [root, *path[:1], *path[2:]])
-    extra = field.json_schema_extra if field is not None else None
-    unit = extra.get("unit", "1") if isinstance(extra, dict) else "1"
     text = (field.description or "").rstrip(".") if field is not None else ""
     suffix = "" if index is None else str([*index])
-    return {"units": str(unit), "long_name": f"{text}{suffix}" if text else key}
+    return {"units": unit_of(field) or "1", "long_name": f"{text}{suffix}" if text else key}
 
 
 def _is_number(entry: Any) -> bool:

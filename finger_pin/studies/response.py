@@ -126,7 +126,7 @@ def _hysteresis(run: Run, name: str, finger: Finger, tip_index: int) -> float:
     """Return the hysteresis of one fingertip, m; nan where nothing goes to and fro."""
     result = run.result
     prefix = f"{name}." if any("." in str(joint) for joint in result["joint"].values) else ""
-    finger_result = result.sel(joint=[prefix + joint for joint in finger.routing.joints])
+    finger_result = result.sel(joint=[*finger.routing.joints])
 
     def tip_positions(variable: str) -> Array:
         angles = rows(finger_result, variable, "joint")

@@ -11,6 +11,8 @@ from finger_pin.simulation.frames import read_scene
 from finger_pin.typing import Array
 
 _DEGREES = {"rad": "°", "rad/s": "°/s", "rad/s^2": "°/s²"}
+#: The attribute of the part of a hand's result that is about one finger: its name.
+OF_FINGER = "of_finger"
 # Thousands of the unit, from 1e-9 to 1e6 times it.
 _PREFIXES = ("n", "\N{MICRO SIGN}", "m", "", "k", "M")
 
@@ -66,8 +68,8 @@ def actuators_by_unit(result: xr.Dataset, group: str) -> dict[str, list[str]]:
 
 
 def _slide_joints(result: xr.Dataset) -> set[str]:
-    joints = read_scene(result.attrs).finger.tree.joints
-    return {name for name, joint in joints.items() if joint.kind == "slide"}
+    joints, prefix = read_scene(result.attrs).finger.tree.joints, f"{result.attrs.get(OF_FINGER, '')}."
+    return {name.removeprefix(prefix) for name, joint in joints.items() if joint.kind == "slide"}
 
 
 def _group_by_key(pairs: Iterable[tuple[str, str]]) -> dict[str, list[str]]:

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
-from finger_pin.description.finger_description import HandSettings
 from finger_pin.description.meshes import Mesh
 from finger_pin.description.validation import validate
 
@@ -154,8 +153,3 @@ def test_actuators_of_a_tree_are_driven_in_open_loop_alone():
     scenario["controller"] = {"kind": "tensions", "inputs": {"moter": {"offset": 1.0}}}
     with pytest.raises(fp.InputError, match="no such actuator; there are motor; did you mean motor"):
         validate(fp.Scenario, scenario, ())
-
-
-def test_a_tree_is_not_placed_on_a_palm():
-    with pytest.raises(fp.InputError, match="a tree of bodies cannot be placed on a palm"):
-        validate(HandSettings, {"name": "hand", "fingers": {"index": {"finger": FINGER}}}, ("hand",))

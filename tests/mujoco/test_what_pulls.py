@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
+from palm_cases import PLACES, TREE, alone_under_turned_gravity, scenario_of
 
 import finger_pin as fp
 
@@ -49,3 +50,19 @@ def test_an_actuator_pulls_with_what_it_exerts_and_an_equality_of_tendons_beside
     # (16): between what it delivers at least and at most, of such a tension.
     pull = signals.tension[0]
     assert pull * (1.0 - np.exp(-0.2)) * 0.99 < signals.level[0] < pull * np.expm1(0.2) * 1.01
+
+
+def test_friction_in_mujoco_is_that_of_each_tree():
+    def acceleration(description, q):
+        spec = mujoco.MjSpec.from_string(fp.to_mjcf(description))
+        fp.mujoco.add_friction(spec, of=description)
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        data.qpos[:], data.qvel[:], data.ctrl[:] = q, 0.1, 1.0
+        mujoco.mj_step(model, data)
+        return data.qacc
+
+    q = [0.2, 0.5, 0.3, 0.005]
+    both = scenario_of({"left": TREE, "right": TREE}).finger
+    alone = [acceleration(alone_under_turned_gravity(name).finger, q) for name in PLACES]
+    np.testing.assert_allclose(acceleration(both, [*q, *q]), np.concatenate(alone), rtol=1e-5)

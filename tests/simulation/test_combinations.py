@@ -66,7 +66,7 @@ FEATURES: dict[str, dict[str, Any]] = {
 }
 APART = [
     *({"finger", other} for other in ("tree", "hand", "moving palm")),
-    *({"tree", other} for other in ("hand", "moving palm", "compensated")),
+    {"tree", "compensated"},
     {"moved object", "moving palm"},
     *({one, other} for one, other in combinations(("own", "open loop", "compensated"), 2)),
 ]
@@ -107,7 +107,7 @@ def scenario_with(features: set[str], path: Path) -> fp.Scenario:
         add(FEATURES[name], table)
     finger = table.pop("finger", {})
     if "hand" in table:
-        finger["base"] = "ub_stand_in"
+        finger |= {} if "tree" in finger else {"base": "ub_stand_in"}
         for placed in table["hand"]["fingers"].values():
             placed["finger"] = finger
     else:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from palm_cases import TREE, scenario_of
 
 import finger_pin as fp
 from finger_pin.exceptions import InputError
@@ -79,3 +80,12 @@ def test_tendons_and_solids_of_a_placed_finger_are_its_own_moved_to_its_place():
     link, offset = whole.tips[0]
     tip = poses.rotation[link] @ offset + poses.translation[link]
     np.testing.assert_allclose(tip, finger.motion(all_joints, np.zeros(20)).tip[0], atol=1e-15)
+
+
+def test_figures_show_what_slides_of_a_finger_in_metres():
+    result = fp.simulate(scenario_of({"left": TREE, "right": "ub"}))
+    labels = [axes.get_ylabel().replace("\xa0", " ") for axes in fp.plot_fig6(result).axes]
+    assert labels[:2] == ["left (° or m)", "right (°)"]
+    assert fp.plot_fig6(result, finger="left").axes[0].get_ylabel() == "position θ (° or m)"
+    drawn = fp.plot_fig6(result).axes[0].get_lines()[3].get_ydata()
+    assert drawn[-1] == result.joint_position[-1].sel(joint="left.thrust")

@@ -110,7 +110,7 @@ def put_inputs(table: dict[str, Any], recording: Recording, scenario: Scenario) 
         section, group = _SCENARIO_ENTRIES[variable]
         entries = table.setdefault(section, {})
         if variable == "tendon_command" and entries.get("kind") != "tensions":
-            inherited = {key: entries[key] for key in ("minimum_tension", "inputs", *BY_NAME[1:]) if key in entries}
+            inherited = {key: entries[key] for key in ("minimum_tension", *BY_NAME[1:]) if key in entries}
             entries = table[section] = {"kind": "tensions", **inherited}
         if variable == "tendon_command":
             check_tension_sign(f"{entry}.inputs.{name}", values)

@@ -155,7 +155,7 @@ class Panel:
     def _add_springs(self) -> None:
         session, stage = self._player.session, self._stage
         hand = session.scenario.hand
-        tip_names = session.finger.description.tree.tip_names if hand is None else tuple(hand.fingers)
+        tip_names = session.finger.description.tree.tip_names or tuple(hand.fingers if hand else ())
         names = tip_names if len(stage.crosses) > 1 else ("fingertip",)
         self._spring_boxes: list[Any] = []
         with self._gui.add_folder("Drag by a spring"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -12,13 +13,16 @@ from matplotlib.lines import Line2D
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
 from finger_pin.views.plots.lines import bundle, names, times
-from finger_pin.views.plots.panels import labelled, legend, sheet, stack, title
+from finger_pin.views.plots.panels import NO_TENDONS, empty_axes, labelled, legend, sheet, stack, title
 from finger_pin.views.plots.style import Width
+from finger_pin.views.shown_units import OF_FINGER, joints_by_unit
 
 #: A column of such a figure: its title, variable, factor and unit.
 Column = tuple[str, str, float, str]
 _ROW_HEIGHT, _COLUMN_WIDTH = 1.5, 4.6
 _DIMENSIONS = ("joint", "tendon")
+# Factor and unit of what slides, by the unit of what turns.
+_OF_SLIDES = {"°": (1.0, "m"), "°/s": (1.0, "m/s"), "mN m": (1e3, "mN")}
 
 
 def fingers_of(result: xr.Dataset) -> list[str]:
@@ -42,6 +46,7 @@ def finger_of(result: xr.Dataset, finger: str) -> xr.Dataset:
             full_names = [name for name in names(part, dimension) if name.startswith(f"{finger}.")]
             short_names = [name.removeprefix(f"{finger}.") for name in full_names]
             part = part.sel({dimension: full_names}).assign_coords({dimension: short_names})
+    part = part.assign_attrs({OF_FINGER: finger})
     return part.sel(finger=finger, drop=True) if "finger" in part.dims else part
 
 
@@ -54,16 +59,26 @@ def plot_by_finger(result: xr.Dataset, columns: Sequence[Column], width: Width, 
     }
     figure, subfigures = sheet([(_COLUMN_WIDTH, 1.2 + _ROW_HEIGHT * len(parts))] * len(columns), width, titles)
     for index, (subfigure, (text, variable, factor, unit)) in enumerate(zip(subfigures, columns, strict=True)):
-        panels = stack(subfigure, [labelled(name, unit) for name in parts])
-        title(panels[0], f"({'abcdef'[index]}) {text}")
         kind = next(kind for kind in _DIMENSIONS if kind in result[variable].dims)
+        shown = {name: _shown(part, kind, factor, unit) for name, part in parts.items()}
+        units = [" or ".join(dict.fromkeys(unit for _, unit in each)) or unit for each in shown.values()]
+        panels = stack(subfigure, [labelled(name, unit) for name, unit in zip(parts, units, strict=True)])
+        title(panels[0], f"({'abcdef'[index]}) {text}")
         lines: dict[str, Line2D] = {}
-        for axes, part in zip(panels, parts.values(), strict=True):
-            lines |= _draw_lines(
-                axes, part, kind, list(styles[kind]), factor * part[variable].transpose("time", kind).values
-            )
+        for axes, (name, part) in zip(panels, parts.items(), strict=True):
+            if not shown[name]:
+                empty_axes(axes, NO_TENDONS)
+                continue
+            values = np.array([each for each, _ in shown[name]]) * part[variable].transpose("time", kind).values
+            lines |= _draw_lines(axes, part, kind, list(styles[kind]), values)
         legend(subfigure, [lines[name] for name in styles[kind]])
     return figure
+
+
+def _shown(part: xr.Dataset, kind: str, factor: float, unit: str) -> list[tuple[float, str]]:
+    """Return the factor and the unit of every joint or tendon of a finger, whose joints may slide."""
+    slides = joints_by_unit(part).get("m", []) if kind == "joint" else []
+    return [_OF_SLIDES[unit] if name in slides else (factor, unit) for name in names(part, kind)]
 
 
 def _draw_lines(axes: Axes, part: xr.Dataset, kind: str, styles: list[str], values: Array) -> dict[str, Line2D]:

@@ -111,6 +111,11 @@ def empty_panel(part: Figure | SubFigure, text: str) -> None:
     """Write in the middle of a part why nothing is drawn there."""
     axes = part.subplots()
     axes.set_axis_off()
+    empty_axes(axes, text)
+
+
+def empty_axes(axes: Axes, text: str) -> None:
+    """Write in the middle of a panel why nothing is drawn there."""
     axes.text(0.5, 0.5, textwrap.fill(text, 3 * _LETTERS), transform=axes.transAxes, ha="center", color=colour(GREY))
 
 
