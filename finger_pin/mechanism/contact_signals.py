@@ -34,8 +34,9 @@ _own_rotation = _split("object_velocity", VELOCITY, slice(3, None))
 
 
 def _bend(signals: FingerSignals) -> Array:
-    bend, contacts = signals.state.contact_bend, signals.of_contacts("level").shape[-1]
-    return bend.reshape(*bend.shape[:-1], contacts, -1)
+    bend, scene = signals.state.contact_bend, signals.finger.scene
+    assert scene is not None
+    return bend.reshape(*bend.shape[:-1], len(scene.contacts.names), scene.contacts.law.arms - 1)
 
 
 #: Signals of contacts and of free objects.

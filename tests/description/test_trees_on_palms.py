@@ -64,7 +64,7 @@ def test_a_tree_accelerates_on_a_palm_as_alone_under_turned_gravity(name):
         force = rng.normal(size=3)
         expected, found = alone.evaluate(x, inputs, force), placed.evaluate(x, inputs, turn @ force)
         np.testing.assert_allclose(found.rate, expected.rate, rtol=1e-9, atol=1e-9)
-        np.testing.assert_allclose(found.joints.reaction, expected.joints.reaction, rtol=1e-9)
+        np.testing.assert_allclose(found["joint_reaction"], expected["joint_reaction"], rtol=1e-9)
         q, v = x[:4], np.zeros(4)
         tip = turn @ alone.motion(q, v).tip + PLACES[name]["position"]
         np.testing.assert_allclose(placed.motion(q, v).tip, tip, atol=1e-15)
