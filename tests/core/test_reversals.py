@@ -56,9 +56,8 @@ def test_friction_above_what_it_can_bear_does_not_grow_at_a_loose_tolerance_eith
     exact = scenario.updated(simulation={"rtol": 1e-9, "atol_scale": 1e-9})
     loose, tight = setup.integrate(), setup.integrate(scenario=exact)
     ends = loose.breakpoints
-    tendons = setup.loop.evaluate(ends, loose.interpolate(ends)).finger.tendons
-    bent = np.abs(np.concatenate([tendons.driven.row.state, tendons.passive.row.state], axis=1))
-    bearable = np.concatenate([tendons.driven["level"], tendons.passive["level"]], axis=1)
+    signals = setup.loop.evaluate(ends, loose.interpolate(ends)).finger
+    bent, bearable = np.abs(signals.at_first_place("state")), signals.at_first_place("level")
     beyond = (bent > 2.0 * bearable)[:-1] & (bent > 2.0 * bearable)[1:]
     assert beyond.any()
     assert np.sum(np.maximum(np.diff(bent, axis=0), 0.0), where=beyond) < 0.02

@@ -13,7 +13,8 @@ from finger_pin.core.addresses.law_code import ROW
 from finger_pin.core.jit import Indices, Matrix, Vector, njit_always_inline, njit_inline
 from finger_pin.core.tables.buffers import Work
 from finger_pin.core.tables.mechanism_parameters import Parameters
-from finger_pin.core.tables.path_tables import PIECE, PathParameters, PathWork
+from finger_pin.core.tables.path_movers import PIECE
+from finger_pin.core.tables.path_tables import PathParameters, PathWork
 from finger_pin.core.tables.structure import Structure
 from finger_pin.mechanism.gaps.signed_distance import GAP_OUT
 

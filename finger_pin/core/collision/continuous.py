@@ -27,7 +27,8 @@ from finger_pin.core.jit import Matrix, Vector, call_at, njit_always_inline, nji
 from finger_pin.core.steps.integration import Integration
 from finger_pin.core.tables.mechanism_parameters import Parameters
 from finger_pin.core.tables.model import Model
-from finger_pin.core.tables.path_tables import LOOK, MAX_LOOKS, PIECE, PathWork
+from finger_pin.core.tables.path_movers import PIECE
+from finger_pin.core.tables.path_tables import LOOK, MAX_LOOKS, PathWork
 from finger_pin.core.tables.structure import Structure
 from finger_pin.mechanism.gaps.signed_distance import GAP_OUT
 

@@ -8,7 +8,7 @@ each of its states decays on its own.
 from __future__ import annotations
 
 from finger_pin.core.addresses.law_code import ROW, TOUCH_SLOPE
-from finger_pin.core.jit import Indices, Matrix, njit_always_inline, njit_inline
+from finger_pin.core.jit import Indices, Matrix, Vector, njit_always_inline, njit_inline
 from finger_pin.core.tables.buffers import Work
 from finger_pin.core.tables.linear_systems import Blocks
 from finger_pin.core.tables.structure import Structure
@@ -100,7 +100,10 @@ def partition(structure: Structure, work: Work, blocks: Blocks, gain: Matrix) ->
 
 @njit_always_inline
 def factorise(matrix: Matrix, size: int, pivots: Indices) -> bool:
-    """Factorise the first rows and columns of a matrix in place with row exchanges; false if that is singular."""
+    """Factorise the first rows and columns of a matrix in place with row exchanges; false if that is singular.
+
+    On the diagonal stands the inverse of the upper factor's.
+    """
     for c in range(size):
         best = c
         for r in range(c + 1, size):
@@ -112,32 +115,30 @@ def factorise(matrix: Matrix, size: int, pivots: Indices) -> bool:
         if best != c:
             for k in range(size):
                 matrix[c, k], matrix[best, k] = matrix[best, k], matrix[c, k]
+        inverse = 1.0 / matrix[c, c]
+        matrix[c, c] = inverse
         for r in range(c + 1, size):
-            factor = matrix[r, c] / matrix[c, c]
+            factor = matrix[r, c] * inverse
             matrix[r, c] = factor
             for k in range(c + 1, size):
                 matrix[r, k] -= factor * matrix[c, k]
     return True
 
 
-@njit_always_inline
-def substitute(matrix: Matrix, size: int, pivots: Indices, right: Matrix, wide: int) -> None:
-    """Replace right-hand sides, one a column, by solutions."""
+@njit_inline
+def substitute(matrix: Matrix, size: int, pivots: Indices, right: Vector) -> None:
+    """Replace a right-hand side by the solution, after `factorise`."""
     for r in range(size):
         best = pivots[r]
         if best != r:
-            for c in range(wide):
-                right[r, c], right[best, c] = right[best, c], right[r, c]
+            right[r], right[best] = right[best], right[r]
     for r in range(size):
+        value = right[r]
         for k in range(r):
-            factor = matrix[r, k]
-            for c in range(wide):
-                right[r, c] -= factor * right[k, c]
+            value -= matrix[r, k] * right[k]
+        right[r] = value
     for r in range(size - 1, -1, -1):
+        value = right[r]
         for k in range(r + 1, size):
-            factor = matrix[r, k]
-            for c in range(wide):
-                right[r, c] -= factor * right[k, c]
-        inverse = 1.0 / matrix[r, r]
-        for c in range(wide):
-            right[r, c] *= inverse
+            value -= matrix[r, k] * right[k]
+        right[r] = value * matrix[r, r]

@@ -8,12 +8,13 @@ changes dq and dv of positions and velocities, and of its own r:
 
 where rows read states of others, the changes of these states are unknowns besides, solved for when all rows are known,
 and what is left is (g M + dh/dv - sum A^T G_v + (dh/dq - sum A^T G_q) / g) dv = M r_v - ... . All of it is linear in
-r, so the solution is kept as one matrix, and a stage costs one product with it.
+r, so right-hand sides and gains are kept as matrices: a stage costs a product with each, and one substitution.
 """
 
 from __future__ import annotations
 
 from finger_pin.core.addresses.law_code import SLOPE
+from finger_pin.core.addresses.spatial import product
 from finger_pin.core.evaluation.blocks import extent, factorise, substitute
 from finger_pin.core.evaluation.readings import add_readings, resolve_readings
 from finger_pin.core.jit import (
@@ -21,9 +22,9 @@ from finger_pin.core.jit import (
     Indices,
     Vector,
     call_at,
+    copy,
     njit_always_inline,
     njit_inline,
-    njit_reassociate,
     unpack,
 )
 from finger_pin.core.tables.linear_systems import Linear
@@ -182,9 +183,10 @@ def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) 
 
 @CompiledFunction
 def condense(address: int, g: float) -> int:
-    """Fill the solution of (g - J) u = r for all r, after `linearise`; return 0 if g - J is singular, else 1."""
+    """Factorise g - J, after `linearise`; return 0 if it is singular, else 1."""
     model = unpack(address, MODEL)
     linear, blocks = model.linear, model.linear.blocks
+    linear.inverse_shift[0] = 1.0 / g
     for index in range(blocks.active_state_count[0]):
         s = blocks.active_states[index]
         linear.loose[s] = 1.0 / (g + blocks.loose[s]) if blocks.loose[s] > 0.0 else 0.0
@@ -196,15 +198,14 @@ def condense(address: int, g: float) -> int:
 
 @njit_always_inline
 def _condense_block(model: Model, address: int, g: float, b: int) -> bool:
-    """Fill the rows of the solution that belong to a block."""
+    """Fill the reduced system of a block, factorised, and its right-hand sides; false if it is singular."""
     linear, blocks = model.linear, model.linear.blocks
-    places = blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]
-    states = blocks.states[blocks.state_start[b] : blocks.state_start[b + 1]]
-    whole = linear.mass.shape[0]
+    begin, end = blocks.coordinate_start[b], blocks.coordinate_start[b + 1]
+    places = blocks.coordinates[begin:end]
     width, wide = extent(blocks, b)
     if not _gains(model, address, g, b, width, wide):
         return False
-    force, velocity, reduced = linear.force, linear.velocity, linear.reduced
+    force, velocity, reduced = linear.force, linear.velocity[begin:end], linear.reduced[begin:end]
     inverse = 1.0 / g
     for i in range(width):
         at_row = places[i]
@@ -224,50 +225,41 @@ def _condense_block(model: Model, address: int, g: float, b: int) -> bool:
                 velocity[i, c] = 0.0
             reduced[i, i], velocity[i, width + i] = g, 1.0
             velocity[i, wide - 1] = model.work.guide_rate[model.structure.prescribed[at_row]]
-    if not factorise(reduced, width, linear.pivots):
-        return False
-    substitute(reduced, width, linear.pivots, velocity, wide)
-    solution = linear.solution
+    return factorise(reduced, width, linear.pivots[begin:end])
+
+
+@njit_always_inline
+def _solve_velocities(linear: Linear, begin: int, width: int, wide: int) -> None:
+    """Replace r of a block's positions and velocities by their changes."""
+    right, change, inverse = linear.right, linear.change, linear.inverse_shift[0]
     for i in range(width):
-        position, moving = solution[places[i]], solution[whole + places[i]]
-        for c in range(wide):
-            moving[c] = velocity[i, c]
-            position[c] = velocity[i, c] * inverse
-        position[i] += inverse
+        change[i] = product(linear.velocity[begin + i], right, wide)
+    substitute(linear.reduced[begin : begin + width], width, linear.pivots[begin : begin + width], change)
     # Gains multiply dq = (r_q + dv) / g and dv.
-    for s in states:
-        state_gain, row = linear.state_gain[s], solution[2 * whole + s]
-        for c in range(width):
-            row[c] = state_gain[c] * inverse
-            row[width + c] = 0.0
-        for c in range(2 * width, wide):
-            row[c] = state_gain[c]
-        for j in range(width):
-            factor = state_gain[j] * inverse + state_gain[width + j]
-            if factor != 0.0:
-                for c in range(wide):
-                    row[c] += factor * velocity[j, c]
-    return True
+    for i in range(width):
+        right[i], right[width + i] = (right[i] + change[i]) * inverse, change[i]
 
 
-@njit_reassociate
+@njit_inline
 def solve(linear: Linear, r: Vector, u: Vector) -> None:
     """Fill u with the solution of (g - J) u = r; the last entry of r is h d_i. States of culled contacts stay."""
-    blocks, right, solution = linear.blocks, linear.right, linear.solution
+    blocks, right = linear.blocks, linear.right
     whole = linear.mass.shape[0]
     if blocks.touches.size == 0:
         # One block for good, all in its order.
-        for i in range(u.size):
-            row, value = solution[i], 0.0
-            for c in range(r.size):
-                value += row[c] * r[c]
-            u[i] = value
+        copy(r, right)
+        _solve_velocities(linear, 0, whole, r.size)
+        for i in range(2 * whole):
+            u[i] = right[i]
+        for s in range(u.size - 2 * whole):
+            u[2 * whole + s] = product(linear.state_gain[s], right, r.size)
         return
     for index in range(blocks.active_state_count[0]):
         s = blocks.active_states[index]
         u[2 * whole + s] = linear.loose[s] * r[2 * whole + s]
     for b in range(blocks.number[0]):
-        places = blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]
+        begin, end = blocks.coordinate_start[b], blocks.coordinate_start[b + 1]
+        places = blocks.coordinates[begin:end]
         states = blocks.states[blocks.state_start[b] : blocks.state_start[b + 1]]
         width, wide = extent(blocks, b)
         for c in range(width):
@@ -275,14 +267,8 @@ def solve(linear: Linear, r: Vector, u: Vector) -> None:
         for c in range(states.size):
             right[2 * width + c] = r[2 * whole + states[c]]
         right[wide - 1] = r[r.size - 1]
-        for i in range(wide - 1):
-            if i < width:
-                at_row = places[i]
-            elif i < 2 * width:
-                at_row = whole + places[i - width]
-            else:
-                at_row = 2 * whole + states[i - 2 * width]
-            row, value = solution[at_row], 0.0
-            for c in range(wide):
-                value += row[c] * right[c]
-            u[at_row] = value
+        _solve_velocities(linear, begin, width, wide)
+        for i in range(width):
+            u[places[i]], u[whole + places[i]] = right[i], right[width + i]
+        for s in states:
+            u[2 * whole + s] = product(linear.state_gain[s], right, wide)

@@ -13,7 +13,8 @@ from finger_pin.core.jit import CompiledFunction, Matrix, Vector, call_shape, nj
 from finger_pin.core.tables.buffers import Work
 from finger_pin.core.tables.linear_systems import Linear
 from finger_pin.core.tables.model import MODEL
-from finger_pin.core.tables.path_tables import PIECE, WRENCH, PathParameters, PathStructure
+from finger_pin.core.tables.path_movers import PIECE
+from finger_pin.core.tables.path_tables import WRENCH, PathParameters, PathStructure
 from finger_pin.core.tables.structure import Structure
 from finger_pin.mechanism.gaps.signed_distance import GAP_OUT, GAP_SLOPE, POINT, SLOPE_WIDTH
 from finger_pin.mechanism.spans.span import COINCIDENT, SPAN_OUT, SPAN_SLOPE
@@ -91,6 +92,18 @@ def _slopes_of_piece(paths: PathStructure, geometry: PathParameters, e: int, wor
                     add_force_cross(axis, wrench[6 * p : 6 * p + 6], out[6 * p : 6 * p + 6])
 
 
+@njit_inline
+def _turns_alike(paths: PathStructure, s: int, e: int, other: int) -> bool:
+    """Return whether the coordinate at an entry of a piece turns it and another piece alike."""
+    if s < paths.start[e] + paths.acting[e]:
+        return False
+    j, body = paths.at[s], paths.bodies[other, PIECE.second]
+    for a in range(paths.start[other], paths.start[other] + paths.acting[other]):
+        if paths.at[a] == j:
+            return False
+    return body >= 0 and (j == body or paths.carries[j, body] > 0)
+
+
 @njit_always_inline
 def _add_turns(structure: Structure, work: Work, linear: Linear, index: int) -> None:
     """Add the derivatives of the angle by which a row's path turns."""
@@ -113,10 +126,14 @@ def _add_turns(structure: Structure, work: Work, linear: Linear, index: int) -> 
         inverse = 1.0 / sine if sine > 1e-12 else 0.0
         for s in range(paths.start[e], paths.start[e + 1]):
             change = pieces.wrench_slope[s, 0]
+            if _turns_alike(paths, s, e, earlier):
+                continue
             for r in range(3):
                 gather[paths.at[s]] += inverse * incoming[r] * change[3 + r]
         for s in range(paths.start[earlier], paths.start[earlier + 1]):
             change = pieces.wrench_slope[s, 0]
+            if _turns_alike(paths, s, earlier, e):
+                continue
             for r in range(3):
                 gather[paths.at[s]] += inverse * change[9 + r] * outgoing[r]
     for b in range(structure.bend_start[k], structure.bend_start[k + 1]):
@@ -170,7 +187,7 @@ def linearise_paths(address: int, _time: float) -> int:
             e, m = paths.piece[leg], paths.column[leg]
             weight = geometry.weight[leg]
             force = weight * work.rows[ROW.force, k]
-            begin, end = paths.start[e], paths.start[e + 1]
+            begin, end = paths.start[e], paths.start[e] + paths.acting[e]
             for r in range(begin, end):
                 i, turning = paths.at[r], 0.0
                 for s in range(begin, end):

@@ -20,7 +20,8 @@ from finger_pin.core.jit import (
 from finger_pin.core.tables.buffers import Work
 from finger_pin.core.tables.mechanism_parameters import Parameters
 from finger_pin.core.tables.model import MODEL
-from finger_pin.core.tables.path_tables import PIECE, WRENCH, PathParameters, PathStructure
+from finger_pin.core.tables.path_movers import PIECE
+from finger_pin.core.tables.path_tables import WRENCH, PathParameters, PathStructure
 from finger_pin.core.tables.structure import Structure
 from finger_pin.mechanism.gaps.signed_distance import GAP_OUT, POINT
 from finger_pin.mechanism.spans.span import COINCIDENT, SPAN_OUT
@@ -196,14 +197,14 @@ def measure_paths(structure: Structure, parameters: Parameters, work: Work) -> N
                     cosine, sine = angle_between(pieces.wrench[before, 0, 9:12], pieces.wrench[e, 0, 3:6])
                     turn += np.arctan2(sine, cosine)
                 before, bends = e, False
-            for r in range(paths.start[e], paths.start[e + 1]):
+            for r in range(paths.start[e], paths.start[e] + paths.acting[e]):
                 net_wrench(paths.moves[r], pieces.wrench[e, m], net)
-                gather[paths.at[r]] = dot(axes[paths.at[r]], net)
-            for a in range(begin, end):
-                j = structure.arm_at[a]
-                work.arm[a] += geometry.weight[leg] * gather[j]
-                work.gradient[a] += geometry.weight[leg] * gather[j]
-                gather[j] = 0.0
+                gather[paths.at[r]] += geometry.weight[leg] * dot(axes[paths.at[r]], net)
+        for a in range(begin, end):
+            j = structure.arm_at[a]
+            work.arm[a] += gather[j]
+            work.gradient[a] += gather[j]
+            gather[j] = 0.0
         pieces.length[k], pieces.turn[k] = length, turn
 
 

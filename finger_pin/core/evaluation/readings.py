@@ -24,22 +24,23 @@ def resolve_readings(structure: Structure, linear: Linear, b: int, width: int, w
     blocks, matrix, solved, reads = linear.blocks, linear.read_matrix, linear.read_gain, structure.read_states.size
     states = blocks.states[blocks.state_start[b] : blocks.state_start[b + 1]]
     matrix[:, :] = np.eye(reads)
-    solved[:, :wide] = 0.0
+    solved[:wide] = 0.0
     for s in states:
         if structure.read_place[s] >= 0:
             p, state_gain = structure.read_place[s], linear.state_gain[s]
             for c in range(reads):
                 matrix[p, c] -= state_gain[wide + c]
             for c in range(wide):
-                solved[p, c] = state_gain[c]
+                solved[c, p] = state_gain[c]
     if not factorise(matrix, reads, linear.read_pivots):
         return False
-    substitute(matrix, reads, linear.read_pivots, solved, wide)
+    for c in range(wide):
+        substitute(matrix, reads, linear.read_pivots, solved[c])
     for p in range(reads):
         for s in states:
             for c in range(wide):
-                linear.state_gain[s, c] += linear.state_gain[s, wide + p] * solved[p, c]
+                linear.state_gain[s, c] += linear.state_gain[s, wide + p] * solved[c, p]
         for j in range(width):
             for c in range(wide):
-                linear.force[j, c] += linear.force[j, wide + p] * solved[p, c]
+                linear.force[j, c] += linear.force[j, wide + p] * solved[c, p]
     return True

@@ -9,8 +9,6 @@ Inverse dynamics, composite inertias and bias are those of Featherstone, Rigid B
 
 from __future__ import annotations
 
-import numpy as np
-
 from finger_pin.core.addresses.spatial import add_force_cross, apply_inertia, dot, motion_cross, sine_cosine
 from finger_pin.core.jit import Vector, njit_always_inline, njit_inline
 from finger_pin.core.tables.buffers import Work
@@ -167,26 +165,37 @@ def mass_matrix(structure: Structure, parameters: Parameters, work: Work) -> Non
 
 @njit_always_inline
 def factorise_mass(structure: Structure, size: int, work: Work) -> None:
-    """Fill work.cholesky with the Cholesky factor of M, its diagonal inverted, tree by tree."""
-    factor = work.cholesky
+    """Fill work.mass_factor with M = L^T D L, from the leaves to the roots, so that no entry between branches fills.
+
+    L has ones on its diagonal, where D^-1 stands instead (Featherstone 2008, section 6.5).
+    """
+    factor = work.mass_factor
     for i in range(size):
-        for j in range(structure.roots[i], i + 1):
-            value = work.mass_matrix[i, j]
-            for k in range(structure.roots[i], j):
-                value -= factor[i, k] * factor[j, k]
-            factor[i, j] = 1.0 / np.sqrt(value) if i == j else value * factor[j, j]
+        for c in range(structure.roots[i], i + 1):
+            factor[i, c] = work.mass_matrix[i, c]
+    for j in range(size - 1, -1, -1):
+        root, inverse, row = structure.roots[j], 1.0 / factor[j, j], factor[j]
+        i = structure.parents[j]
+        while i >= 0:
+            share, above = row[i] * inverse, factor[i]
+            for c in range(root, i + 1):
+                above[c] -= share * row[c]
+            i = structure.parents[i]
+        for c in range(root, j):
+            row[c] *= inverse
+        row[j] = inverse
 
 
 @njit_always_inline
 def solve_mass(structure: Structure, size: int, work: Work, vector: Vector) -> None:
     """Replace a vector by M^-1 vector after `factorise_mass`."""
-    factor = work.cholesky
-    for i in range(size):
-        value = vector[i]
-        for k in range(structure.roots[i], i):
-            value -= factor[i, k] * vector[k]
-        vector[i] = value * factor[i, i]
-    for i in range(size - 1, -1, -1):
-        vector[i] *= factor[i, i]
-        for k in range(structure.roots[i], i):
-            vector[k] -= factor[i, k] * vector[i]
+    factor = work.mass_factor
+    for j in range(size - 1, -1, -1):
+        value, row = vector[j], factor[j]
+        for c in range(structure.roots[j], j):
+            vector[c] -= row[c] * value
+    for j in range(size):
+        value, row = vector[j] * factor[j, j], factor[j]
+        for c in range(structure.roots[j], j):
+            value -= row[c] * vector[c]
+        vector[j] = value

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.linalg
 
 from finger_pin.core.evaluation.condensation import condense
 from finger_pin.core.evaluation.dynamics import evaluate
@@ -51,16 +52,26 @@ def rate_derivatives(mechanism: Mechanism, x: Array, command: Array) -> tuple[Ar
 
 def _resolved(linear: Linear) -> tuple[Array, Array]:
     """Return the Jacobian and the derivative by time of solutions (g - J)^-1 (r + f_t), block by block."""
-    blocks, whole, solution = linear.blocks, len(linear.mass), linear.solution
-    jacobian, by_time = np.zeros((len(solution), len(solution))), np.zeros(len(solution))
+    blocks, whole = linear.blocks, len(linear.mass)
+    size = 2 * whole + len(blocks.loose)
+    jacobian, by_time = np.zeros((size, size)), np.zeros(size)
     # Of open contacts, each on its own.
     alone = 2 * whole + np.arange(len(blocks.loose))
     jacobian[alone, alone] = -blocks.loose
     for b in range(blocks.number[0]):
-        places = blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]
+        begin, end = blocks.coordinate_start[b : b + 2]
+        places, width = blocks.coordinates[begin:end], end - begin
         states = blocks.states[blocks.state_start[b] : blocks.state_start[b + 1]]
         at = np.concatenate([places, whole + places, 2 * whole + states])
-        inverse = np.linalg.inv(solution[at, : len(at)])
+        wide = len(at) + 1
+        factors = linear.reduced[begin:end, :width].copy()
+        np.fill_diagonal(factors, 1.0 / np.diag(factors))
+        moving = scipy.linalg.lu_solve((factors, linear.pivots[begin:end]), linear.velocity[begin:end, :wide])
+        moved = (np.eye(width, wide) + moving) / _G
+        gain = linear.state_gain[states, :wide].copy()
+        of_motion, gain[:, : 2 * width] = gain[:, : 2 * width].copy(), 0.0
+        solution = np.concatenate([moved, moving, gain + of_motion @ np.concatenate([moved, moving])])
+        inverse = np.linalg.inv(solution[:, :-1])
         jacobian[np.ix_(at, at)] = _G * np.eye(len(at)) - inverse
-        by_time[at] = inverse @ solution[at, len(at)]
+        by_time[at] = inverse @ solution[:, -1]
     return jacobian, by_time

@@ -43,7 +43,7 @@ class Work(NamedTuple):
         base_velocity, base_acceleration: Of the base, less gravity, in its own axes, shape (6,).
         base_rate: Their rates, shape (2, 6).
         base_power: Power of the base, shape (1,), W.
-        mass_matrix, cholesky: M, and its Cholesky factor with the diagonal inverted, shape (n, n).
+        mass_matrix, mass_factor: M, and the factors of `factorise_mass`, shape (n, n).
         by_position, by_velocity: Derivatives of inverse dynamics, shape (n, n).
         rows: Arguments and results of the rows' laws, shape (columns, K); columns `ROW`.
         slopes: Derivatives of the laws, shape (columns, K); columns `SLOPE`, of contacts `TOUCH_SLOPE`.
@@ -73,7 +73,7 @@ class Work(NamedTuple):
     coriolis: Matrix
     vectors: Matrix
     mass_matrix: Matrix
-    cholesky: Matrix
+    mass_factor: Matrix
     by_position: Matrix
     by_velocity: Matrix
     rows: Matrix
@@ -115,7 +115,7 @@ def build_work(structure: Structure, laws: Sequence[Law | ContactLaw], channels:
         coriolis=np.zeros((size, 12)),
         vectors=np.zeros((2, 6)),
         mass_matrix=np.zeros((size, size)),
-        cholesky=np.zeros((size, size)),
+        mass_factor=np.zeros((size, size)),
         by_position=np.zeros((size, size)),
         by_velocity=np.zeros((size, size)),
         rows=np.zeros((columns, count)),

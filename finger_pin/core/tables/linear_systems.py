@@ -93,10 +93,10 @@ def build_blocks(structure: Structure, control: InputTable) -> Blocks:
 
 
 class Linear(NamedTuple):
-    """Partial derivatives at one state, and the solution of (g - J) u = r; K rows, N coordinates, Z states.
+    """Partial derivatives at one state, and the factors of g - J; K rows, N coordinates, Z states.
 
     Columns of what is wide are (r of positions, N | r of velocities, N | r of states, Z | h d_i of a stage, 1) of one
-    block; before the reduced system is solved, velocities stand in place of their r. What is full has a column more for
+    block; in gains, changes of positions and velocities stand in place of their r. What is full has a column more for
     the change of every state that any row reads, R. Of what blocks have in common the rows are those of the whole.
 
     Attributes:
@@ -117,15 +117,16 @@ class Linear(NamedTuple):
         state_gain: d z, shape (Z, full).
         load, command: Of one row, shape (full,).
         force: Sum of A^T d phi of a block, shape (N, full).
-        read_gain: d z of the states that are read, shape (R, wide).
+        read_gain: d z of the states that are read, shape (wide, R).
         read_matrix: What they change of each other, shape (R, R), factorised in place.
         read_pivots: Row exchanges, shape (R,).
-        reduced: Of a block, shape (N, N), factorised in place.
+        reduced: Systems of the blocks' velocities, one after the other, shape (N, N), factorised in place.
         pivots: Row exchanges, shape (N,).
-        velocity: The solution's velocities of a block, shape (N, wide).
-        solution: The solution u, shape (2 N + Z, wide).
+        velocity: Their right-hand sides, shape (N, wide).
+        inverse_shift: 1 / g, shape (1,).
+        change: Of the velocities of a block, shape (N,).
         loose: Of the states of open contacts, u / r, shape (Z,).
-        right: The right-hand side of a block, shape (wide,).
+        right: The right-hand side of a block, and then the changes of its positions and velocities, shape (wide,).
         blocks: The coupled blocks.
     """
 
@@ -153,7 +154,8 @@ class Linear(NamedTuple):
     reduced: Matrix
     pivots: Indices
     velocity: Matrix
-    solution: Matrix
+    inverse_shift: Vector
+    change: Vector
     loose: Vector
     right: Vector
     blocks: Blocks
@@ -164,7 +166,7 @@ def build_linear(structure: Structure, control: InputTable) -> Linear:
     count, width, states = len(structure.state), len(structure.prescribed), len(structure.state_row)
     wide, reads = 2 * width + states + 1, len(structure.read_states)
     full = wide + reads
-    if (needed := 8.0 * wide * max(count, wide)) > (present := physical_memory()):
+    if (needed := 8.0 * full * (count + states + width)) > (present := physical_memory()):
         pairs, most = structure.contact_rows // structure.contact_arms, present / 2**30
         allowed = f"{pairs} pairs of bodies can touch, which needs {needed / 2**30:.3g} GiB of memory, of {most:.3g}"
         raise InputError("contacts", f"{allowed}; let fewer bodies touch")
@@ -187,13 +189,14 @@ def build_linear(structure: Structure, control: InputTable) -> Linear:
         load=np.zeros(full),
         command=np.zeros(full),
         force=np.zeros((width, full)),
-        read_gain=np.zeros((reads, wide)),
+        read_gain=np.zeros((wide, reads)),
         read_matrix=np.zeros((reads, reads)),
         read_pivots=np.zeros(reads, dtype=np.int64),
         reduced=np.zeros((width, width)),
         pivots=np.zeros(width, dtype=np.int64),
         velocity=np.zeros((width, wide)),
-        solution=np.zeros((wide - 1, wide)),
+        inverse_shift=np.zeros(1),
+        change=np.zeros(width),
         loose=np.zeros(states),
         right=np.zeros(wide),
         blocks=build_blocks(structure, control),

@@ -13,17 +13,9 @@ from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector, ref
 from finger_pin.core.tables.axes import along
 from finger_pin.core.tables.chains import Chains
 from finger_pin.core.tables.motion_bounds import Carrying, motion_bounds
+from finger_pin.core.tables.path_movers import PIECE, find_movers
 from finger_pin.mechanism.gaps.signed_distance import GAP_OUT_SIZE, GAP_SLOPE_SIZE
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place
-
-
-class PieceBodies(NamedTuple):
-    """Columns of the bodies of a piece: those of its two points, of its frame, and of its third point."""
-
-    first: int
-    second: int
-    frame: int
-    third: int
 
 
 class LookColumns(NamedTuple):
@@ -38,7 +30,6 @@ class LookColumns(NamedTuple):
 
 
 LOOK = LookColumns(*range(len(LookColumns._fields)))
-PIECE = PieceBodies(*range(len(PieceBodies._fields)))
 # Numbers of a wrench on the first body, then on the second: (moment, force) each.
 WRENCH = 12
 # A step is halved so often at most, less two, to look for touches.
@@ -53,7 +44,9 @@ class PathStructure(NamedTuple):
         thirds: One where a piece has a third point, shape (E,).
         value, slopes: Addresses of the shape of each, shape (E,).
         columns: Number of wrenches of each that rows use, shape (E,).
-        start: First index of the coordinates that move a piece, shape (E + 1,).
+        start: First index of the coordinates that move a piece, shape (E + 1,); of a span only those that act on it,
+            and others that act on the legs beside it and turn it as a whole.
+        acting: How many of these act on it, the first ones, shape (E,).
         at: Coordinates, shape (entries,).
         moves: One where a coordinate moves the body, the first columns of `PIECE`, shape (entries, 3).
         opposing_coordinate: Coordinate that moves the other body in the same direction, -1 for none, shape (entries,).
@@ -73,6 +66,7 @@ class PathStructure(NamedTuple):
     slopes: Annotated[Indices, along("piece")]
     columns: Annotated[Indices, along("piece")]
     start: Annotated[Indices, along("piece", starts="mover")]
+    acting: Annotated[Indices, along("piece")]
     at: Annotated[Indices, along("mover", of="body")]
     moves: Annotated[IndexTable, along("mover", "x")]
     opposing_coordinate: Annotated[Indices, along("mover", of="body")]
@@ -190,11 +184,11 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> tuple[Pat
     ends = [(*p.ends, Place(0, np.zeros(3)))[:3] for p in pieces]
     carried = [(a.joint, b.joint, p.joint, third.joint) for p, (a, b, third) in zip(pieces, ends, strict=True)]
     bodies = np.array([[last[joint] for joint in row] for row in carried], dtype=np.int64).reshape(-1, len(PIECE))
-    entries = [_movers(row, parents) for row in bodies]
     shapes = np.zeros((len(pieces), max((len(p.shape.parameters) for p in pieces), default=0)))
     for row, piece in zip(shapes, pieces, strict=True):
         row[: len(piece.parameters)] = piece.parameters
     points = [np.concatenate([turns[end.joint].T @ end.point for end in row]) for row in ends]
+    entries, acting = find_movers(paths, number, bodies, points, chains)
     carrying = Carrying.from_chains(chains)
     bounds = [motion_bounds(piece, *each, last, carrying) for piece, each in zip(pieces, entries, strict=True)]
     halves = [0.5 * float(np.linalg.norm(row[3:6] - row[:3])) for row in points]
@@ -211,6 +205,7 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> tuple[Pat
         slopes=np.array([shape_address(p.shape.slopes) for p in pieces], dtype=np.int64),
         columns=np.array([columns[p] for p in pieces], dtype=np.int64),
         start=np.cumsum([0, *(len(at) for at, _ in entries)]),
+        acting=acting,
         at=np.concatenate([np.zeros(0, dtype=np.int64), *(at for at, _ in entries)]),
         moves=np.concatenate([np.zeros((0, 3), dtype=np.int64), *(moves for _, moves in entries)]),
         opposing_coordinate=np.concatenate([np.zeros(0, dtype=np.int64), *(others for _, others in bounds)]),
@@ -243,18 +238,6 @@ def coordinates_of_paths(paths: PathStructure, count: int, width: int) -> NDArra
         for e in paths.piece[begin:end]:
             mask[k, paths.at[paths.start[e] : paths.start[e + 1]]] = True
     return mask
-
-
-def _movers(bodies: NDArray[np.int64], parents: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the coordinates that move some bodies, and a mask of the first three for each."""
-    moves = np.zeros((len(parents), len(PIECE)), dtype=np.int64)
-    for which, body in enumerate(bodies):
-        at = int(body)
-        while at >= 0:
-            moves[at, which] = 1
-            at = int(parents[at])
-    moved = np.flatnonzero(moves.any(axis=1))
-    return moved, np.ascontiguousarray(moves[moved, : PIECE.third])
 
 
 def build_path_work(paths: PathStructure, count: int, width: int) -> PathWork:

@@ -1,0 +1,53 @@
+"""Cords over many joints: every leg moves with its own joints alone, and its corners with those of its neighbours."""
+
+import mujoco
+import numpy as np
+import pytest
+
+import finger_pin as fp
+from finger_pin.core.signals.rate_derivatives import rate_derivatives
+
+JOINTS = 6
+FRICTION = {"coulomb": 0.3, "stiction_ratio": 1.0, "viscous": 0.1}
+
+
+def chain(coincident):
+    """Return links that turn about many axes, and two cords that share legs; at hinges points of both links may meet."""
+    axes = np.random.default_rng(4).normal(size=(JOINTS, 3))
+    bodies, path = "", ["start"]
+    for k, axis in enumerate(axes):
+        anchor = f"0.03 0.00{k} 0.004" if k else "0 0 0"
+        bodies += f'<body name="b{k}" pos="{anchor}"><joint name="j{k}" axis="{axis[0]} {axis[1]} {axis[2]}"/>'
+        bodies += '<inertial pos="0.015 0 0" mass="0.01" diaginertia="1e-6 2e-6 2e-6"/>'
+        if coincident and k:
+            bodies += f'<site name="here{k}" pos="0 0 0"/><site name="too{k}" pos="0 0 0"/>'
+            path += [f"here{k}", f"too{k}"] if k % 2 else [f"here{k}"]
+        bodies += f'<site name="p{k}" pos="0.015 0.00{k} 0.006"/>'
+        path.append(f"p{k}")
+        if coincident and k + 1 < JOINTS:
+            bodies += f'<site name="there{k}" pos="0.03 0.00{k + 1} 0.004"/>'
+            path.append(f"there{k}")
+    sites = "".join(f'<site site="{name}"/>' for name in path)
+    other = sites.replace("start", "elsewhere")
+    return f"""<mujoco><worldbody><site name="start" pos="-0.01 0 0.01"/><site name="elsewhere" pos="-0.01 0.01 0.02"/>
+    {bodies}{"</body>" * JOINTS}</worldbody><tendon><spatial name="one">{sites}</spatial>
+    <spatial name="two">{other}</spatial></tendon>
+    <actuator><motor tendon="one" gear="-1"/><motor tendon="two" gear="-1"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize("coincident", [False, True])
+@pytest.mark.parametrize("place", ["canal", "bends"])
+def test_the_rate_of_a_chain_of_joints_has_the_derivatives_that_its_differences_show(coincident, place):
+    description = fp.from_mujoco(mujoco.MjSpec.from_string(chain(coincident)))
+    finger = fp.Finger(description.updated(tendon_friction=FRICTION | {"place": place}))
+    rng, pull = np.random.default_rng(8), np.array([3.0, 2.0])
+    x = finger.rest_state(rng.uniform(-0.6, 0.6, JOINTS), rng.normal(size=JOINTS))
+    x = x + 1e-3 * rng.normal(size=x.size)
+    step = 1e-6 * np.eye(x.size)
+    differences = (
+        np.array([finger.rhs(0.0, x + each, pull) - finger.rhs(0.0, x - each, pull) for each in step]).T / 2e-6
+    )
+    found, _ = rate_derivatives(finger.mechanism, x, pull)
+    # Of bends where nothing slides, differences are rounding.
+    scale = np.maximum(np.abs(differences).max(axis=1, keepdims=True), 1e-2)
+    np.testing.assert_allclose(found / scale, differences / scale, atol=2e-6)
