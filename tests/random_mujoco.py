@@ -31,8 +31,12 @@ def mujoco_rubs_alike(model: RandomModel) -> None:
         finger["tendon_friction"] |= {"place": "canal"}
     scenario = tight(table)
     run = fp.simulate(scenario)
-    if "cord_tension" in run and run.cord_tension.max() < 1.0:
-        return  # In MuJoCo's step a cord that is all but slack keeps the floor of its friction.
+    if "cord_tension" in run and (run.cord_tension.max() < 1.0 or run.cord_tension.min() < 0.0):
+        return  # In MuJoCo's step friction takes no more than a cord's tension, and its floor where that is slack.
+    if "tendon_dry_friction_level" in run:
+        held = np.abs(run.tendon_dry_friction_force.values[-1]) / run.tendon_dry_friction_level.values[-1]
+        if held.min() < 0.5:
+            return  # Bristles of a constant loss that have only begun to bend, where MuJoCo's loss holds at once.
     expected = run.isel(time=[0, -1])
     spec = mujoco.MjSpec.from_string(fp.to_mjcf(scenario.finger, limits=False))
     fp.mujoco.add_friction(spec, of=scenario.finger)
