@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
-from finger_pin.laws.muscle import active_work
 from finger_pin.mechanism.coerce import FingerLike, as_finger, as_inputs
 from finger_pin.mechanism.finger import Finger
-from finger_pin.mechanism.groups import MUSCLES, SOURCES_WITH_END, STATEFUL, STATELESS, WINCHES
+from finger_pin.mechanism.groups import ACTUATORS, SOURCES_WITH_END, WINCHES
 from finger_pin.mechanism.signals import FingerSignals
 from finger_pin.typing import Array
 
@@ -135,14 +134,12 @@ class _Statics:
             finger.mechanism.split(rest)[2][:] = friction
         actuator_state = finger.layout.unpack(rest).actuator_state
         for table in finger.mechanism.rows:
-            if table.group in (STATEFUL, MUSCLES):
+            if table.group in ACTUATORS and table.states:
                 # Lags have settled; the input's limits are those of an activation as well.
-                of_input = ("lowest", "highest")
-                of_state = ("least_state", "most_state") if table.group == STATEFUL else of_input
-                limits = [table.law.parameters.index(name) for name in (*of_input, *of_state)]
-                lower_input, upper_input, lowest, highest = table.parameters[limits]
-                inputs = np.clip(command[table.channels], lower_input, upper_input)
-                actuator_state[: table.count] = np.clip(inputs, lowest, highest)
+                settled = np.clip(command[table.channels], table["lowest"], table["highest"])
+                if "least_state" in table.law.parameters:
+                    settled = np.clip(settled, table["least_state"], table["most_state"])
+                actuator_state[: table.count] = settled
                 actuator_state = actuator_state[table.count :]
         scale = np.concatenate([np.ones(len(position)), np.full(passive, 1e-3)])
         return cls(finger, command, tip_force, rest, scale, finger.led_joints)
@@ -215,24 +212,12 @@ def _held_by_friction(signals: FingerSignals) -> float:
 
 
 def _actuator_work(signals: FingerSignals) -> float:
-    """Return the work of a tree's actuators along their lengths, J: the integral of a force that limits cut."""
-    total = 0.0
-    for group in (STATELESS, STATEFUL, WINCHES):
-        if group not in signals.mechanism.rows:
-            continue
-        rows = signals.mechanism.rows[group]
-        by_length, lower, upper = rows.rows.parameters[[2, 6, 7]]
-        unlimited = rows["wanted"]
-        limited = np.clip(unlimited, lower, upper)
-        # With F = F_0 + b l the integral is H(F) / b, with H = F^2 / 2 within the limits, and a line beyond them.
-        affine = np.where(unlimited == limited, 0.5 * unlimited**2, limited * unlimited - 0.5 * limited**2)
-        constant = by_length == 0.0
-        divisor = np.where(constant, 1.0, by_length)
-        total += float(np.sum(np.where(constant, limited * rows.row.length, affine / divisor)))
-    if MUSCLES in signals.mechanism.rows:
-        rows = signals.mechanism.rows[MUSCLES]
-        total += float(np.sum(active_work(rows.row.length, rows.row.state, rows.rows.parameters)))
-    return total
+    """Return the work of actuators and winches along their lengths, J; that of tensions counts with the tendons."""
+    return sum(
+        float(np.sum(table.rows.law.work(table.row, table.rows.parameters, table.signals)))
+        for group, table in signals.mechanism.rows.items()
+        if group != SOURCES_WITH_END and table.rows.law.work is not None
+    )
 
 
 def _descend(

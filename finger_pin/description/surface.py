@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from finger_pin.description.primitives import KINDS, Sized
+from finger_pin.description.primitives import KINDS, SOLIDS, Sized
 from finger_pin.description.validation import (
     MILLIMETRES,
     Description,
@@ -72,9 +72,7 @@ class Surface(Description):
 class Shaped(Sized):
     """A convex solid, or a half-space, with a surface."""
 
-    shape: Annotated[Literal["half_space", "sphere", "box", "cylinder", "capsule", "ellipsoid"], choice(*KINDS)] = (
-        quantity(..., unit="1", source="design", doc=f"One of {', '.join(KINDS)}.")
-    )
+    shape: Annotated[str, choice(*KINDS)] = quantity(..., unit="1", source="design", doc=f"One of {', '.join(KINDS)}.")
     surface: Surface | None = Field(None, description="Its contact; by default that of the other surface.")
 
 
@@ -87,8 +85,8 @@ class BodyShape(Shaped):
 
     continues: ClassVar[bool] = False
 
-    shape: Annotated[Literal["sphere", "box", "cylinder", "capsule", "ellipsoid"], choice(*KINDS)] = quantity(
-        ..., unit="1", source="design", doc="One of sphere, box, cylinder, capsule, ellipsoid."
+    shape: Annotated[str, choice(*SOLIDS)] = quantity(
+        ..., unit="1", source="design", doc=f"One of {', '.join(SOLIDS)}."
     )
     position: Annotated[tuple[float, float, float], vector(3, -100.0, 100.0, MILLIMETRES)] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its centre, in the body's frame."

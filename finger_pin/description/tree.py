@@ -208,8 +208,7 @@ class Tree(Description):
         """Return the ends of the axes of a solid, or the corners of a mesh, shape (k, 3), m, in its frame."""
         if isinstance(solid, TreeSolid) and solid.mesh is not None:
             return self.meshes[solid.mesh].unpacked()[0]
-        half = KINDS[solid.primitive].half_axis(solid.sizes)
-        return np.concatenate([np.diag(half), -np.diag(half)])
+        return KINDS[solid.primitive].axis_ends(solid.sizes)
 
     def _legs(self, path: Mapping[str, Waypoint]) -> list[tuple[float, list[CordElement]]]:
         """Return divisor and legs of every part of a path; a leg crosses the joints that move only one of its ends."""

@@ -8,7 +8,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from finger_pin.description.objects import ObjectState, check_moments
 from finger_pin.description.placement import PathSignal
-from finger_pin.description.primitives import Sized, Triple
+from finger_pin.description.primitives import SOLIDS, Sized, Triple
 from finger_pin.description.surface import BodyShape
 from finger_pin.description.validation import (
     MILLIMETRES,
@@ -45,10 +45,9 @@ class TreeSolid(Sized):
 
     kind_entry: ClassVar[str] = "kind"
 
-    kind: Annotated[
-        Literal["sphere", "capsule", "cylinder", "box", "ellipsoid", "mesh"],
-        choice("sphere", "capsule", "cylinder", "box", "ellipsoid", "mesh"),
-    ] = quantity(..., unit="1", source="design", doc="sphere, capsule, cylinder, box, ellipsoid or mesh.")
+    kind: Annotated[str, choice(*SOLIDS, "mesh")] = quantity(
+        ..., unit="1", source="design", doc="sphere, capsule, cylinder, box, ellipsoid or mesh."
+    )
     mesh: Name | None = Field(None, description="Of a mesh, which one of the tree's.")
     position: Annotated[Triple, BODY_POINT] = quantity(
         (0.0, 0.0, 0.0), unit="m", source="design", doc="Of its centre, or a mesh's origin, in the body's frame."

@@ -15,7 +15,7 @@ import numpy as np
 
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.meshes import Mesh
-from finger_pin.description.primitives import KINDS
+from finger_pin.description.primitives import SOLIDS
 from finger_pin.description.tree_parts import Tip
 from finger_pin.description.validation import MOST_ANGLE, validate
 from finger_pin.exceptions import InputError, LeftOutWarning
@@ -27,7 +27,7 @@ from finger_pin.exchange.mujoco_keyframes import read_keyframes
 from finger_pin.exchange.mujoco_names import Names, Table, entry_name, quaternion, unused_name
 from finger_pin.exchange.mujoco_overlay import add_tendons
 from finger_pin.exchange.mujoco_shapes import Shapes
-from finger_pin.exchange.mujoco_sizes import described_sizes, geom_kind
+from finger_pin.exchange.mujoco_sizes import KIND_OF_GEOM, described_sizes, geom_kind
 from finger_pin.exchange.mujoco_tendons import TendonReader, passed_bodies
 from finger_pin.exchange.mujoco_unsupported import ElementReader, LeftOutElements, apply_flags, within_margin
 from finger_pin.mechanism.body_places import rotation
@@ -215,8 +215,8 @@ class _Reader:
         for i in visible if len(visible) else geoms:
             kind = geom_kind(self.mujoco, model, int(i))
             pose = {"position": model.geom_pos[i].tolist(), "orientation": quaternion(model.geom_quat[i])}
-            if kind in KINDS:
-                solids[self.names.geoms[i]] = {"kind": kind, **described_sizes(kind, model.geom_size[i]), **pose}
+            if (solid := KIND_OF_GEOM.get(kind)) in SOLIDS:
+                solids[self.names.geoms[i]] = {"kind": solid, **described_sizes(solid, model.geom_size[i]), **pose}
             elif kind == "mesh" and model.body_weldid[body]:
                 # A forearm that stands still would be in the way.
                 name = self.names.meshes[model.geom_dataid[i]]

@@ -6,13 +6,14 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 
 from finger_pin.description.finger_description import FingerDescription
+from finger_pin.description.primitives import KINDS
 from finger_pin.description.surface import Shaped, Surface
 from finger_pin.description.tree import Tree
 from finger_pin.description.tree_parts import MATERIALS, Body
 from finger_pin.exceptions import InputError
 from finger_pin.exchange.mjcf_compliance import Mobility, impact_ratio, quaternion, soft
 from finger_pin.exchange.mujoco_sizes import mujoco_sizes
-from finger_pin.mechanism.contact_rows import law_numbers
+from finger_pin.mechanism.contact_rows import law_parameters
 from finger_pin.mechanism.solids import pairs_apart
 from finger_pin.mechanism.xml_numbers import numbers
 
@@ -20,6 +21,8 @@ from finger_pin.mechanism.xml_numbers import numbers
 IDLE, HIDDEN = {"contype": "0", "conaffinity": "0"}, "4"
 # Attributes of geoms that touch objects of MuJoCo's default type, and not each other.
 _CONTACT = {"contype": "0", "conaffinity": "1"}
+# Half sides and spacing of the grid with which MuJoCo draws a plane, m.
+_DRAWN_PLANE = (1.0, 1.0, 0.1)
 
 
 def add_assets(root: ET.Element, tree: Tree) -> None:
@@ -60,9 +63,10 @@ def add_geom(
     attributes: Mapping[str, str],
 ) -> None:
     """Add a geom of a kind of this package, with its sizes, m, and its place in a body."""
-    shape = {"type": kind, "size": numbers(*mujoco_sizes(kind, sizes))}
-    if kind == "half_space":
-        shape = {"type": "plane", "size": "1 1 0.1"}
+    geom = KINDS[kind].geom
+    if geom is None:
+        raise InputError(name, f"is not written: MuJoCo has no {kind}; make it a mesh, or leave it out")
+    shape = {"type": geom, "size": numbers(*mujoco_sizes(kind, sizes) or _DRAWN_PLANE)}
     pose = {"pos": numbers(*position), "quat": quaternion(orientation)}
     ET.SubElement(element, "geom", {"name": name, "mass": "0", **shape, **pose, **attributes})
 
@@ -100,11 +104,13 @@ def add_pairs(
         earlier = [other for other in [*tree.objects][:k] if item.moves or tree.objects[other].moves]
         pairs += [(other, name) for other in (*owner, *earlier) if frozenset((name, other)) not in apart]
     for pair in pairs:
-        stiffness, damping, exponent, _, mu, *_, radius = law_numbers(*(solids[item].surface for item in pair))
-        friction = _rubbing(mu, radius * mu, numbers(mu, mu, radius * mu or 0.005, 1e-4, 1e-4))
+        law = law_parameters(*(solids[item].surface for item in pair))
+        mu, torsion = law["kinetic"], law["torsion_radius"] * law["kinetic"]
+        friction = _rubbing(mu, torsion, numbers(mu, mu, torsion or 0.005, 1e-4, 1e-4))
         pair_mobility = sum(mobility.bodies[owner.get(item, item)] for item in pair)
         # A spring of Hertz's exponent has no stiffness of its own.
-        softness = soft(stiffness, impact_ratio(damping), pair_mobility, is_ratio=True) if exponent == 1.0 else {}
+        is_linear, ratio = law["exponent"] == 1.0, impact_ratio(law["damping"])
+        softness = soft(law["stiffness"], ratio, pair_mobility, is_ratio=True) if is_linear else {}
         geom_names = {f"geom{k}": geoms.get(item, item) for k, item in enumerate(pair, 1)}
         ET.SubElement(contact, "pair", geom_names | friction | softness)
 

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from finger_pin.description.objects import Object
-from finger_pin.description.primitives import KINDS
+from finger_pin.description.primitives import SOLIDS
 from finger_pin.exchange.mujoco_names import Table, model_name, quaternion, unused_name
 from finger_pin.exchange.mujoco_pairs import Pairs
-from finger_pin.exchange.mujoco_sizes import described_sizes, geom_kind
+from finger_pin.exchange.mujoco_sizes import KIND_OF_GEOM, described_sizes, geom_kind
 from finger_pin.exchange.mujoco_unsupported import ElementReader, disabled
 from finger_pin.mechanism.body_places import rotation
 from finger_pin.mechanism.contact_rows import DEEPEST_START
@@ -48,7 +48,7 @@ class Shapes:
         return model_name(self.model, "geom", i)
 
     def _is_solid(self, i: int) -> bool:
-        return geom_kind(self.mujoco, self.model, i) in KINDS
+        return KIND_OF_GEOM.get(geom_kind(self.mujoco, self.model, i)) in SOLIDS
 
     def _is_plane(self, i: int) -> bool:
         model = self.model
@@ -82,8 +82,7 @@ class Shapes:
     def _shape(self, i: int) -> Table:
         """Return shape, sizes and surface of a geom."""
         model = self.model
-        kind, size = geom_kind(self.mujoco, model, i), model.geom_size[i]
-        shape = "half_space" if kind == "plane" else kind
+        shape, size = KIND_OF_GEOM[geom_kind(self.mujoco, model, i)], model.geom_size[i]
         default_surface = {"friction": float(model.geom_friction[i, 0]) if model.geom_condim[i] > 1 else 0.0}
         return {"shape": shape, **described_sizes(shape, size), "surface": self._surfaces.get(i, default_surface)}
 
@@ -104,7 +103,7 @@ class Shapes:
         for body in free_bodies:
             name, geoms = self.names.bodies[body], [i for i in self._colliding if model.geom_bodyid[i] == body]
             if len(geoms) != 1 or not self._is_solid(geoms[0]) or any(model.body_parentid == body):
-                self.left_out.add(f"free body {name}: an object is one sphere, capsule, cylinder, box or ellipsoid")
+                self.left_out.add(f"free body {name}: an object is one {', '.join(SOLIDS[:-1])} or {SOLIDS[-1]}")
             elif not self._overlaps_body(geoms[0]):
                 (i,) = geoms
                 self._object_names[i] = unused_name(name, used | {*objects}, "object")

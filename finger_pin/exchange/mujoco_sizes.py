@@ -9,6 +9,8 @@ import numpy as np
 
 from finger_pin.description.primitives import KINDS
 
+#: Kinds of this package by MuJoCo's names.
+KIND_OF_GEOM = {kind.geom: name for name, kind in KINDS.items() if kind.geom}
 _SHARE = {"radius": 1.0, "length": 0.5, "sides": 0.5, "semi_axes": 1.0}
 
 

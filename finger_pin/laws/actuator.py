@@ -31,6 +31,15 @@ def _account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numb
     return 0.0 * force, force * row.speed
 
 
+def _work(row: Row, p: Parameters, signals: Numbers) -> Number:
+    # With F = F_0 + b l the integral is H(F) / b, with H = F^2 / 2 within the limits, and a line beyond them.
+    by_length, least, most, wanted = p[2], p[6], p[7], signals[0]
+    limited = np.minimum(np.maximum(wanted, least), most)
+    affine = np.where(wanted == limited, 0.5 * wanted**2, limited * wanted - 0.5 * limited**2)
+    constant = by_length == 0.0
+    return np.where(constant, limited * row.length, affine / np.where(constant, 1.0, by_length))
+
+
 #: g u + b_0 + b_1 l + b_2 l', as MuJoCo's actuators without dynamics; g = k_p and b_1 = -k_p make a servo.
 ACTUATOR = Law(
     name="actuator",
@@ -40,6 +49,7 @@ ACTUATOR = Law(
     account=_account,
     signals=("wanted",),
     supplies=("actuators",),
+    work=_work,
 )
 
 # Rate at which a state returns to its limits, 1/s.
@@ -97,4 +107,5 @@ ACTUATOR_WITH_STATE = Law(
     signals=("wanted", "free_rate"),
     supplies=("actuators",),
     scale=1.0,
+    work=_work,
 )

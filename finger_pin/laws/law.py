@@ -82,6 +82,8 @@ class Law:
             on one way, z' falls with z, from its rate at z = 0 to zero at the most that z can be. Steps after which a
             state is beyond twice that and has grown are tried again, shorter.
         reads_states: Whether the law heeds ``Row.reading``.
+        work: (row, p, signals) -> the integral over l, at rest, of the force that a source supplies, J; None for a law
+            whose force is stored or lost.
     """
 
     name: str
@@ -95,6 +97,7 @@ class Law:
     scale: float | None = None
     kink: str = ""
     reads_states: bool = False
+    work: Callable[..., Any] | None = None
     arms: ClassVar[int] = 1
     states: ClassVar[int] = 1
 
@@ -189,6 +192,7 @@ class ContactLaw:
     arms: int = 3
     supplies: ClassVar[tuple[str, ...]] = ()
     reads_states: ClassVar[bool] = False
+    work: ClassVar[None] = None
 
     @property
     def states(self) -> int:

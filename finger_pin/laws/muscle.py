@@ -34,13 +34,12 @@ def _length_share(length: Number, shortest: Number, longest: Number) -> tuple[Nu
     return up * down, slope_up / (1.0 - shortest) * down - up * slope_down / (longest - 1.0)
 
 
-def active_work(length: Number, activation: Number, p: Parameters) -> Number:
-    """Return the integral of the active force at rest over l, J."""
+def _work(row: Row, p: Parameters, signals: Numbers) -> Number:
     peak, optimal, origin, shortest, longest = p[:5]
-    stretch = (length - origin) / optimal
+    stretch = (row.length - origin) / optimal
     rising, falling = (_clip01((stretch - shortest) / (1.0 - shortest)), _clip01((longest - stretch) / (longest - 1.0)))
     up, down = ((2.0 * s**3 - 4.0 * np.maximum(s - 0.5, 0.0) ** 3) / 3.0 for s in (rising, falling))
-    return -peak * activation * optimal * ((1.0 - shortest) * up + (longest - 1.0) * (0.5 - down))
+    return -peak * row.state * optimal * ((1.0 - shortest) * up + (longest - 1.0) * (0.5 - down))
 
 
 def _speed_share(speed: Number, lengthening: Number) -> tuple[Number, Number]:
@@ -131,4 +130,5 @@ MUSCLE = Law(
     signals=("active",),
     supplies=("actuators",),
     scale=1.0,
+    work=_work,
 )

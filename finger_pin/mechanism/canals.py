@@ -18,10 +18,10 @@ import numpy as np
 from finger_pin.description.cords import Cord
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.laws.capstan import CANAL_FRICTION, CORD_TENSION
-from finger_pin.mechanism.groups import BRANCHES, CANALS, CORDS, ELASTIC, TENDON_LOSSES, WRAPS
+from finger_pin.mechanism.groups import BRANCHES, CANALS, CORDS, ELASTIC, SOURCES, TENDON_LOSSES, WRAPS
 from finger_pin.mechanism.rows import Rows
 from finger_pin.mechanism.tendon_paths import TendonPaths
-from finger_pin.mechanism.tendons import BRISTLES, SLACK, SOURCES, Tendons
+from finger_pin.mechanism.tendons import BRISTLES, SLACK, Tendons
 from finger_pin.mechanism.tree_mechanism import actuator_table
 from finger_pin.typing import Array
 

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from finger_pin.description.primitives import KINDS
 from finger_pin.mechanism.gaps import prism_parameters
 from finger_pin.mechanism.solids import Solid
 from finger_pin.typing import Array
@@ -58,10 +59,9 @@ class ContactPart:
 
 def fillet(solid: Solid) -> float:
     """Return the radius with which a box's edges or a cylinder's rims are rounded, m; none of others."""
-    if solid.shape not in ("box", "cylinder"):
+    if solid.shape not in _FACED:
         return 0.0
-    halves = (solid.sizes[0], 0.5 * solid.sizes[1]) if solid.shape == "cylinder" else 0.5 * np.array(solid.sizes)
-    return min(_FILLET_SHARE * float(min(halves)), _LARGEST_FILLET)
+    return min(_FILLET_SHARE * min(KINDS[solid.shape].half_sides(solid.sizes)), _LARGEST_FILLET)
 
 
 def solid_contacts(one: Solid, other: Solid) -> Iterator[tuple[Solid, ContactPart, Solid, tuple[float, ...]]]:
@@ -73,35 +73,25 @@ def solid_contacts(one: Solid, other: Solid) -> Iterator[tuple[Solid, ContactPar
     for a, w in ((one, other), (other, one)):
         if w.shape == "half_space":
             prism = prism_parameters(w.shape, ())
-            yield from ((a, part, w, prism) for part in _on_plane(a))
+            yield from ((a, part, w, prism) for part in _PARTS[a.shape](a, 0.0))
             return
     for a, w in ((one, other), (other, one)):
         if a.shape == "ellipsoid":
-            yield a, _ellipsoid(a), w, () if w.shape == a.shape else prism_parameters(w.shape, w.sizes, fillet(w))
+            prism = () if w.shape == a.shape else prism_parameters(w.shape, w.sizes, fillet(w))
+            yield from ((a, part, w, prism) for part in _PARTS[a.shape](a, 0.0))
             return
     for a, w in ((one, other), (other, one)):
         if a.shape in ("sphere", "capsule"):
             prism = prism_parameters(w.shape, w.sizes)
-            yield from ((a, part, w, prism) for part in _round(a, w.shape in ("box", "cylinder")))
+            yield from ((a, part, w, prism) for part in _round(a, w.shape in _FACED))
             return
     for a, w in ((one, other), (other, one)):
         rounding, prism = fillet(a), prism_parameters(w.shape, w.sizes, fillet(w))
-        parts = _corners(a, rounding) if a.shape == "box" else _rims(a, rounding)
+        parts = _PARTS[a.shape](a, rounding)
         parts += _edges(a, rounding) if a.shape == "box" else []
         if a.shape == w.shape == "cylinder" and a is one:
             parts += [_whole(a, rounding)]
         yield from ((a, part, w, prism) for part in parts)
-
-
-def _on_plane(solid: Solid) -> list[ContactPart]:
-    if solid.shape == "box":
-        return _corners(solid, 0.0)
-    if solid.shape == "cylinder":
-        return _rims(solid, 0.0)
-    if solid.shape == "ellipsoid":
-        return [_ellipsoid(solid)]
-    ends = _axis(solid)[1 if solid.shape == "sphere" or solid.joined else 0 :]
-    return [ContactPart(np.stack([end, end]), solid.sizes[0]) for end in ends]
 
 
 def _round(solid: Solid, faces: bool) -> list[ContactPart]:
@@ -111,6 +101,12 @@ def _round(solid: Solid, faces: bool) -> list[ContactPart]:
         return [ContactPart(ends, radius)]
     middle = ends.mean(axis=0)
     return [ContactPart(np.stack([middle, end]), radius) for end in ends]
+
+
+def _ends(solid: Solid, rounding: float) -> list[ContactPart]:
+    """Return a sphere's centre, or the ends of a capsule's axis; a far one only if the near one lies in another."""
+    ends = _axis(solid)[1 if solid.shape == "sphere" or solid.joined else 0 :]
+    return [ContactPart(np.stack([end, end]), solid.sizes[0] + rounding) for end in ends]
 
 
 def _axis(solid: Solid) -> Array:
@@ -147,11 +143,16 @@ def _rims(solid: Solid, rounding: float) -> list[ContactPart]:
     return parts
 
 
-def _ellipsoid(solid: Solid) -> ContactPart:
+def _ellipsoid(solid: Solid, rounding: float) -> list[ContactPart]:
     x, y, z = solid.sizes
-    return ContactPart(np.array([[0.0, 0.0, 0.0], [x, 0.0, 0.0], [0.0, y, 0.0]]), 0.0, 0.0, 0.0, z)
+    return [ContactPart(np.array([[0.0, 0.0, 0.0], [x, 0.0, 0.0], [0.0, y, 0.0]]), rounding, 0.0, 0.0, z)]
 
 
 def _whole(solid: Solid, rounding: float) -> ContactPart:
     radius, half = solid.sizes[0] - rounding, 0.5 * solid.sizes[1] - rounding
     return ContactPart(np.array([[0.0, 0.0, -half], [0.0, 0.0, half]]), rounding, radius)
+
+
+# The parts of a kind that meet a plane, and with a rounding, m, those of kinds with faces that meet each other.
+_PARTS = {"sphere": _ends, "box": _corners, "cylinder": _rims, "capsule": _ends, "ellipsoid": _ellipsoid}
+_FACED = ("box", "cylinder")

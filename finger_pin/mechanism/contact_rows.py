@@ -53,7 +53,7 @@ def contact_rows(
         for index, (a, part, w, prism) in enumerate(touches):
             piece = _piece(a, part, w, prism)
             names.append(f"{a.name}-{w.name}" + (f".{index}" if len(touches) > 1 else ""))
-            numbers.append(law_numbers(a.surface, w.surface))
+            numbers.append(tuple(law_parameters(a.surface, w.surface).values()))
             pieces.append(piece)
     parameters = np.array(numbers).reshape(-1, len(CONTACT.parameters)).T
     # One that resists spinning makes rows of four arms of all.
@@ -95,20 +95,11 @@ def check_start(contacts: Rows, body: RigidBody, q: Array) -> None:
         )
 
 
-def law_numbers(one: Surface | None, other: Surface | None) -> tuple[float, ...]:
-    """Return the numbers of the law between two surfaces: of each the smaller; None leaves it to the other."""
+def law_parameters(one: Surface | None, other: Surface | None) -> dict[str, float]:
+    """Return the law's parameters between two surfaces: of each the smaller; None leaves it to the other."""
     surfaces = [each for each in (one, other) if each is not None] or [Surface()]
-    number = {name: min(getattr(each, name) for each in surfaces) for name in Surface.model_fields}
-    kinetic = number["friction"]
-    return (
-        number["stiffness"],
-        number["damping"],
-        number["exponent"],
-        kinetic * number["stiction_ratio"],
-        kinetic,
-        number["tangential_stiffness"],
-        number["lag"],
-        number["stribeck_velocity"],
-        number["floor"],
-        number["torsion"] / kinetic if number["torsion"] else 0.0,
-    )
+    least: dict[str, float] = {name: min(getattr(each, name) for each in surfaces) for name in Surface.model_fields}
+    kinetic, torsion = least["friction"], least["torsion"]
+    least |= {"kinetic": kinetic, "static": kinetic * least["stiction_ratio"]}
+    least |= {"torsion_radius": torsion / kinetic if torsion else 0.0}
+    return {name: least[name] for name in CONTACT.parameters}

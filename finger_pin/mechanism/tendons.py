@@ -16,14 +16,12 @@ from finger_pin.description.routing import Routing
 from finger_pin.laws.actuator import ACTUATOR
 from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION, capstan_coefficient
 from finger_pin.laws.spring import TENDON_HALF
-from finger_pin.mechanism.groups import SOURCES_WITH_END, TENDON_LOSSES, WINCHES
+from finger_pin.mechanism.groups import SOURCES, SOURCES_WITH_END, TENDON_LOSSES, WINCHES
 from finger_pin.mechanism.joints import OF_TENDONS, hysteresis_rows
 from finger_pin.mechanism.rows import Energy, Rows
 from finger_pin.mechanism.wiring import drive_matrices
 from finger_pin.typing import Array, Number
 
-#: What ideal sources of force supply.
-SOURCES = Energy("actuators", "actuators")
 SLACK = Energy("slack", "tensions cut at zero")
 BRISTLES = Energy("tendon_bristles", "tendon bristles")
 _WINCH_ENERGY = Energy("winches", "winches, through their cords")

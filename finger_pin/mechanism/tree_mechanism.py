@@ -19,48 +19,19 @@ from finger_pin.description.tree import Tree
 from finger_pin.description.tree_actuators import TreeActuator
 from finger_pin.description.tree_parts import Coupling
 from finger_pin.exceptions import InputError
-from finger_pin.laws.actuator import ACTUATOR, ACTUATOR_WITH_STATE
-from finger_pin.laws.bristle import PIN_FRICTION
-from finger_pin.laws.law import Law
-from finger_pin.laws.limiter import STROKE_LIMITER
-from finger_pin.laws.muscle import MUSCLE
-from finger_pin.laws.spring import CONSTANT_FORCE, DEAD_BAND_SPRING, ELASTIC_TENDON, JOINT_SPRING
 from finger_pin.mechanism.bodies import place_bodies
-from finger_pin.mechanism.groups import ELASTIC, MUSCLES, STATEFUL, STATELESS
+from finger_pin.mechanism.groups import ACTUATORS, ELASTIC, MUSCLES, STATEFUL, STATELESS, TREE_TABLES
 from finger_pin.mechanism.path_elements import PathElement, Paths, PathTerm, Place
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.rows import Energy, Rows
+from finger_pin.mechanism.rows import Rows
 from finger_pin.mechanism.spans import ANGLE, RISE
 from finger_pin.mechanism.tendon_paths import TendonPaths
-from finger_pin.mechanism.tendons import SOURCES
 from finger_pin.typing import Array
 
 # Dry friction of a tendon holds until it has slid so far, m.
 _DRY_STICTION = 1e-4
 # How soon an actuator of limited rate follows its input, s.
 _INPUT_LAG, _UNLIMITED = 1e-4, (-np.inf, np.inf)
-# What rows of a tree store and exchange, by table.
-_STORED = {
-    "tendon_spring": Energy("tendon_spring", "tendons' springs"),
-    ELASTIC: Energy("tendon_spring", "tendons' springs"),
-    "tendon_limit": Energy("tendon_limit", "tendons' limits"),
-    "coupling": Energy("coupling", "couplings"),
-    "loop": Energy("loop", "loops"),
-    "gravity_compensation": Energy("gravity_compensation", "weights compensated"),
-    "actuator_with_state": Energy("joint_springs", "joints' springs"),
-    "actuator": Energy("joint_springs", "joints' springs"),
-    "muscle": Energy("muscle_passive", "muscles' passive elements"),
-}
-_EXCHANGED_POWERS = {
-    "tendon_spring": (Energy("tendon_spring_damping", "tendons' dampers"),),
-    ELASTIC: (Energy("tendon_spring_damping", "tendons' dampers"),),
-    "tendon_limit": (Energy("tendon_limit_limiter", "tendons' limits"),),
-    "coupling": (Energy("coupling_damping", "couplings"),),
-    "loop": (Energy("loop_damping", "loops"),),
-    "actuator_with_state": (SOURCES,),
-    "actuator": (SOURCES,),
-    "muscle": (Energy("muscles", "muscles"),),
-}
 
 
 def build_body(description: FingerDescription, body: RigidBody | None = None) -> tuple[RigidBody, TendonPaths]:
@@ -100,14 +71,13 @@ def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -
     """Return the rows of a tree, without the friction of loaded tendons, for a number of coordinates."""
     tree = description.tree
 
-    def table(
-        group: str, law: Law, names: Iterable[str], numbers: _Numbers, along: tuple[Array, Paths], **further: Any
-    ) -> Rows:
+    def table(group: str, names: Iterable[str], numbers: _Numbers, along: tuple[Array, Paths], **further: Any) -> Rows:
         arms, paths = along
         arm = np.zeros((len(arms), width))
         arm[:, : arms.shape[1]] = arms
-        wiring = {"stored": _STORED.get(group), "powers": _EXCHANGED_POWERS.get(group, ())}
-        return Rows(group, law, tuple(names), np.array(numbers, dtype=float).T, arm, paths=paths, **(wiring | further))
+        law, stored, powers = TREE_TABLES[group]
+        parameters = np.array(numbers, dtype=float).T
+        return Rows(group, law, tuple(names), parameters, arm, paths=paths, stored=stored, powers=powers, **further)
 
     described = (
         *_tendons(tree, routes),
@@ -115,15 +85,15 @@ def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -
         _loops(tree, routes),
         _weights(description, routes),
     )
-    tables = [table(*each) for each in described if each[2]]
+    tables = [table(*each) for each in described if each[1]]
     cords = {name: each for name, each in tree.tendons.items() if each.slack is not None}
     if cords:
         along = routes.along([routes.cords[name] for name in cords], -1.0)
         offset = np.array([routes.reference_lengths[name] + (each.slack or 0.0) for name, each in cords.items()])
         numbers = [(each.stiffness, each.damping) for each in cords.values()]
-        tables.append(table(ELASTIC, ELASTIC_TENDON, cords, numbers, along, offset=offset, unit="m"))
+        tables.append(table(ELASTIC, cords, numbers, along, offset=offset, unit="m"))
     first = len(description.actuated_names)
-    for group, law in ((STATELESS, ACTUATOR), (STATEFUL, ACTUATOR_WITH_STATE), (MUSCLES, MUSCLE)):
+    for group in ACTUATORS:
         actuators = {name: each for name, each in tree.actuators.items() if actuator_table(each) == group}
         if actuators:
             pulled = (
@@ -132,12 +102,12 @@ def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -
             along = routes.along(pulled, [each.gear for each in actuators.values()])
             channels = first + np.array([list(tree.actuators).index(name) for name in actuators])
             parameters = [_actuator(each) for each in actuators.values()]
-            tables.append(table(group, law, actuators, parameters, along, channels=channels))
+            tables.append(table(group, actuators, parameters, along, channels=channels))
     return tables
 
 
 _Numbers = Sequence[Sequence[float]]
-_Described = tuple[str, Law, Collection[str], _Numbers, tuple[Array, Paths]]
+_Described = tuple[str, Collection[str], _Numbers, tuple[Array, Paths]]
 
 
 def _about(joint: str, radius: float = -1.0) -> Cord:
@@ -157,11 +127,11 @@ def _tendons(tree: Tree, routes: TendonPaths) -> list[_Described]:
     # Law (9) whose level is its floor.
     level = [(0, 0, each.friction / _DRY_STICTION, 0, 1, each.friction, 1, 0, 0, 0, 0, 0) for each in rubbing.values()]
     return [
-        (group, law, names, numbers, routes.along(routes.cords[name] for name in names))
-        for group, law, names, numbers in (
-            ("tendon_spring", DEAD_BAND_SPRING, sprung, springs),
-            ("tendon_limit", STROKE_LIMITER, limited, limits),
-            ("tendon_dry_friction", PIN_FRICTION, rubbing, level),
+        (group, names, numbers, routes.along(routes.cords[name] for name in names))
+        for group, names, numbers in (
+            ("tendon_spring", sprung, springs),
+            ("tendon_limit", limited, limits),
+            ("tendon_dry_friction", rubbing, level),
         )
     ]
 
@@ -176,7 +146,7 @@ def _couplings(description: FingerDescription, routes: TendonPaths) -> _Describe
     arms, _ = routes.along(cords)
     numbers = [(each.stiffness, each.offset, each.damping) for each in couplings.values()]
     paths = tuple(_higher_powers(description, routes, each) for each in couplings.values())
-    return "coupling", JOINT_SPRING, couplings, numbers, (arms, paths)
+    return "coupling", couplings, numbers, (arms, paths)
 
 
 def _higher_powers(description: FingerDescription, routes: TendonPaths, coupling: Coupling) -> tuple[PathTerm, ...]:
@@ -210,7 +180,7 @@ def _loops(tree: Tree, routes: TendonPaths) -> _Described:
         for axis, unit in zip("xyz", np.eye(3), strict=True):
             heights[f"{name}.{axis}"] = _height(first.place(loop.position), second.place(loop.other_position), unit)
     numbers = [(loop.stiffness, 0.0, loop.damping) for loop in tree.loops.values() for _ in "xyz"]
-    return "loop", JOINT_SPRING, heights, numbers, (np.zeros((len(heights), 1)), tuple(heights.values()))
+    return "loop", heights, numbers, (np.zeros((len(heights), 1)), tuple(heights.values()))
 
 
 def _weights(description: FingerDescription, routes: TendonPaths) -> _Described:
@@ -227,7 +197,7 @@ def _weights(description: FingerDescription, routes: TendonPaths) -> _Described:
         _height(base, places[name].place(each.centre), -gravity / size) for name, each in compensated.items()
     )
     numbers = [(each.gravity_compensation * each.mass * size,) for each in compensated.values()]
-    return "gravity_compensation", CONSTANT_FORCE, compensated, numbers, (np.zeros((len(heights), 1)), heights)
+    return "gravity_compensation", compensated, numbers, (np.zeros((len(heights), 1)), heights)
 
 
 def _height(first: Place, second: Place, axis: Array) -> tuple[PathTerm]:

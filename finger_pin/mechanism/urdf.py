@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pinocchio as pin
@@ -11,8 +11,8 @@ import pinocchio as pin
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.links import BASE, TIP, is_base
 from finger_pin.description.loading import DescriptionLike, describe
+from finger_pin.description.primitives import KINDS
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.surface import BodyShape
 from finger_pin.description.tree_parts import MATERIALS, Body, Coupling, TreeJoint, TreeSolid
 from finger_pin.mechanism.body_places import joint_placement, rotation
 from finger_pin.mechanism.xml_numbers import numbers as _numbers
@@ -22,9 +22,12 @@ from finger_pin.mechanism.xml_numbers import numbers as _numbers
 TENSION_LIMIT = 100.0
 VELOCITY_LIMIT = 20.0
 
-# The geometry of a solid in a body's frame: its kind, sizes, m, place and attitude.
-_Geometry = tuple[str, Sequence[float], pin.SE3]
-_SIZES = {"box": ("size",), "sphere": ("radius",), "cylinder": ("radius", "length")}
+# The element of a geometry, and its attributes from the scale.
+_ELEMENTS: dict[str, Callable[[Sequence[float]], tuple[str, dict[str, str]]]] = {
+    "box": lambda scale: ("box", {"size": _numbers(*scale)}),
+    "ball": lambda scale: ("sphere", {"radius": _numbers(scale[0])}),
+    "cylinder": lambda scale: ("cylinder", {"radius": _numbers(scale[0]), "length": _numbers(scale[2])}),
+}
 # Mass and moments of the links between several joints of a body, kg and kg m2: MuJoCo refuses moving ones without.
 _SLIGHT = 1e-14
 _SLIGHT_INERTIA = (_SLIGHT,) * 3 + (0.0,) * 3
@@ -34,7 +37,7 @@ _NOTES = """
   Written from a tree of bodies. A body with several joints has a link for each, of which the last has its mass
   and the others 1e-14 kg.
   Left out, because a URDF has no place for it: tendons, actuators, loops, springs, the inertia of rotors;
-  couplings by more than a ratio and an offset, meshes, ellipsoids, objects.{rest}
+  couplings by more than a ratio and an offset, meshes, {kinds}, objects.{rest}
 """
 
 
@@ -115,7 +118,9 @@ def _notes(description: FingerDescription) -> str:
     is_asymmetric = bool(np.any(description.joint_friction.drag_asymmetry))
     left_out = (*description.tree.left_out, *[asymmetry] * is_asymmetric)
     rest = "".join(f"\n  - {line}" for line in left_out)
-    return _NOTES.format(title=description.title or description.name, rest=rest).replace("--", "- -")
+    kinds = ", ".join(f"{name}s" for name, kind in KINDS.items() if not kind.in_urdf)
+    title = description.title or description.name
+    return _NOTES.format(title=title, kinds=kinds, rest=rest).replace("--", "- -")
 
 
 def _kind(description: FingerDescription, joint: str, moved: TreeJoint) -> str:
@@ -170,14 +175,14 @@ def _add_link(root: ET.Element, name: str, body: Body, place: pin.SE3, drawn: bo
     add_inertial(link, place * pin.SE3(np.eye(3), np.array(body.centre)), body.mass, body.inertia)
     for role, solids in (("visual", body.solids), ("collision", body.shapes)) if drawn else ():
         for solid in solids.values():
-            for kind, sizes, where in _geometries(solid):
+            where = pin.SE3(rotation(solid.orientation), np.array(solid.position))
+            for shape, height in solid.parts if solid.in_urdf else ():
                 element = ET.SubElement(link, role)
-                _add_origin(element, place * where)
+                _add_origin(element, place * (where * pin.SE3(np.eye(3), np.array([0.0, 0.0, height]))))
                 geometry = ET.SubElement(element, "geometry")
                 if isinstance(solid, TreeSolid):
                     ET.SubElement(element, "material", name=solid.material)
-                values = [_numbers(*sizes)] if kind == "box" else map(_numbers, sizes)
-                ET.SubElement(geometry, kind, dict(zip(_SIZES[kind], values, strict=True)))
+                ET.SubElement(geometry, *_ELEMENTS[shape.kind](shape.scale))
 
 
 def add_inertial(link: ET.Element, place: pin.SE3, mass: float, inertia: Sequence[float] = (0.0,) * 6) -> None:
@@ -194,11 +199,3 @@ def add_inertial(link: ET.Element, place: pin.SE3, mass: float, inertia: Sequenc
     ET.SubElement(inertial, "mass", value=_numbers(mass))
     moments = dict(zip(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), map(_numbers, inertia), strict=True))
     ET.SubElement(inertial, "inertia", moments)
-
-
-def _geometries(solid: TreeSolid | BodyShape) -> Iterator[_Geometry]:
-    """Yield the geometries of a solid that a URDF has; a capsule is a cylinder and two spheres."""
-    place = pin.SE3(rotation(solid.orientation), np.array(solid.position))
-    for part in solid.parts:
-        if part.kind in _SIZES:
-            yield part.kind, part.sizes, place * pin.SE3(np.eye(3), np.array([0.0, 0.0, part.height]))

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 
-from finger_pin.mechanism.groups import MUSCLES, STATEFUL, STATELESS, WRAPS, is_canal
+from finger_pin.mechanism.groups import ACTUATORS, WRAPS, is_canal
 from finger_pin.mechanism.rows import LOST, STORED, SUPPLIED
 from finger_pin.simulation.energy import account_entries
 from finger_pin.simulation.frames import read_scene
@@ -113,7 +113,7 @@ def _joints(result: xr.Dataset) -> list[list[str]]:
 
 def _actuators(result: xr.Dataset) -> list[list[str]]:
     forces: dict[str, dict[str, Array]] = {}
-    for group in (STATELESS, STATEFUL, MUSCLES):
+    for group in ACTUATORS:
         if f"{group}_force" in result:
             for unit, names in actuators_by_unit(result, group).items():
                 forces.setdefault(unit, {}).update(

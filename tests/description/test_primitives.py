@@ -44,16 +44,13 @@ def test_parts_that_are_drawn_cover_the_solid_and_no_more(kind):
     sizes, inside = SOLIDS[kind]
     x = np.random.default_rng(1).uniform(-0.06, 0.06, (100_000, 3))
     covered = np.zeros(len(x), dtype=bool)
-    for part in KINDS[kind].parts(sizes):
-        moved = x - [0.0, 0.0, part.height]
-        # A part has sizes of its own: measured against the unit solid of its kind.
-        own = {
-            "sphere": lambda y, s: np.linalg.norm(y, axis=1) <= s[0],
-            "box": lambda y, s: (2.0 * np.abs(y) <= s).all(axis=1),
-            "cylinder": lambda y, s: (np.hypot(y[:, 0], y[:, 1]) <= s[0]) & (2.0 * np.abs(y[:, 2]) <= s[1]),
-            "ellipsoid": lambda y, s: ((y / s) ** 2).sum(axis=1) <= 1.0,
-        }[part.kind]
-        covered |= own(moved, np.array(part.sizes))
+    for geometry, height in KINDS[kind].parts(sizes):
+        y = (x - [0.0, 0.0, height]) / geometry.scale
+        covered |= {
+            "ball": np.linalg.norm(y, axis=1) <= 1.0,
+            "box": (np.abs(y) <= 0.5).all(axis=1),
+            "cylinder": (np.hypot(y[:, 0], y[:, 1]) <= 1.0) & (np.abs(y[:, 2]) <= 0.5),
+        }[geometry.kind]
     assert (covered == inside(x)).all()
 
 

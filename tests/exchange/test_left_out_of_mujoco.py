@@ -30,7 +30,7 @@ def test_elements_that_are_not_carried_over_are_listed():
         "actuator actuator_1: it has dynamics of its own",
         "actuator actuator_2: it drives a body",
         "equality both: of tendons through space",
-        "free body thing: an object is one sphere, capsule, cylinder, box or ellipsoid",
+        "free body thing: an object is one sphere, box, cylinder, capsule or ellipsoid",
     )
     assert list(description.tree.actuators) == ["actuator_0"]
     assert list(description.tree.bodies) == ["w", "hand"]

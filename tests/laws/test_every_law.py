@@ -75,6 +75,25 @@ def test_value_slopes_and_account_return_what_the_law_declares(drawn):
         assert not np.any(rate) and not any(np.any(slope) for slope in of_rate)
 
 
+@pytest.mark.parametrize("name", [name for name, law in LAWS.items() if law.work])
+def test_work_of_a_law_grows_with_the_length_by_the_force_that_it_supplies_at_rest(name):
+    """The force is the slope of the supplied power by the speed; a third of the rows have the same at all lengths."""
+    law, rng = LAWS[name], np.random.default_rng(22)
+    row, p = random_rows(rng, COUNT)._replace(speed=np.zeros(COUNT)), random_parameters(law, rng, COUNT)
+    if "by_length" in law.parameters:
+        p[law.parameters.index("by_length"), ::3] = 0.0
+    value, account, work = map(for_complex, (law.value, law.account, law.work))
+
+    def supplied(moved):
+        force, rate, *signals = value(moved, p)
+        return account(moved, p, force, rate, signals)[1:2]
+
+    (slope,) = along(lambda moved: [work(moved, p, value(moved, p)[2:])], row, "length")
+    (expected,) = along(supplied, row, "speed")
+    assert np.ptp(expected) > 0.1
+    np.testing.assert_allclose(slope, expected, rtol=1e-12, atol=1e-12)
+
+
 def test_the_account_explains_the_power_of_every_row(drawn):
     """Force times speed is what is supplied, less what is lost, less the change of what is stored."""
     law, row, p = drawn

@@ -6,6 +6,7 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.description.objects import Object
+from finger_pin.description.surface import Surface
 from finger_pin.laws.contact_law import CONTACT
 from finger_pin.mechanism.bodies import place_bodies
 from finger_pin.mechanism.contact_rows import check_start, contact_rows
@@ -194,3 +195,15 @@ def test_a_wrong_object_is_one_clear_line(entries, tmp_path):
     with pytest.raises(fp.InputError, match=ERRORS[entries]) as caught:
         fp.load_scenario(file)
     assert str(caught.value).startswith("environment.objects.thing") and "\n" not in str(caught.value)
+
+
+def test_parameters_of_a_contact_are_the_smaller_of_both_surfaces_by_name():
+    """mu_s is mu_k times the smaller ratio, and the length of the torsion what mu_k makes the smaller torsion of."""
+    hard = Surface(stiffness=3e4, damping=1.0, friction=0.5, stiction_ratio=1.4, torsion=0.002, floor=1e-3, lag=2e-3)
+    soft = Surface(stiffness=1e4, damping=3.0, friction=0.8, stiction_ratio=1.2, torsion=0.001, floor=1e-4, lag=5e-3)
+    ball, other = (BALL.updated(surface=each, position=(x, 0.0, 0.0)) for x, each in ((0.1, hard), (0.2, soft)))
+    _, _, contacts = scene(ball=ball, other=other)
+    pair = contacts.names.index("ball-other")
+    given = {"stiffness": 1e4, "damping": 1.0, "exponent": 1.0, "static": 0.6, "kinetic": 0.5, "torsion_radius": 0.002}
+    given |= {"floor": 1e-4, "lag": 2e-3, "tangential_stiffness": 7e3, "stribeck_velocity": 0.01}
+    assert {name: contacts[name][pair] for name in CONTACT.parameters} == pytest.approx(given)

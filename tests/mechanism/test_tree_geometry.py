@@ -82,12 +82,11 @@ def test_solids_are_those_that_mujoco_shows_and_stand_where_it_has_them():
         mesh = model.mesh(model.geom_dataid[i])
         points = slice(mesh.vertadr[0], mesh.vertadr[0] + mesh.vertnum[0])
         expected = model.mesh_vert[points] @ data.geom_xmat[i].reshape(3, 3).T + data.geom_xpos[i]
-        found = np.asarray(visual.shape.vertices()) @ (rotation @ visual.placement.rotation).T
+        found = visual.geometry.corners @ (rotation @ visual.placement.rotation).T
         found += rotation @ visual.placement.translation + place
         np.testing.assert_allclose(found, expected, atol=1e-7)
         faces = slice(mesh.faceadr[0], mesh.faceadr[0] + mesh.facenum[0])
-        triangle = visual.shape.tri_indices(5)
-        assert [triangle[k] for k in range(3)] == model.mesh_face[faces][5].tolist()
+        assert visual.geometry.faces[5].tolist() == model.mesh_face[faces][5].tolist()
         meshes += 1
     assert (meshes, boxes, drawn) == (22, 2, {})
     assert len(description.tree.meshes) == 10

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pinocchio as pin
 import viser
 
 from finger_pin.control import PalmPath
+from finger_pin.description.primitives import Geometry
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.typing import Array
 from finger_pin.views.playground.session import Reading, Session
@@ -31,6 +33,13 @@ _MAX_OPACITY = 0.42
 _PEAK_DECAY = 0.995
 _SPRING_COLOUR = (255, 134, 180)
 _NO_LINES = np.zeros((0, 2, 3))
+# What adds a geometry to a viser scene, and its arguments.
+_METHODS: dict[str, tuple[str, Callable[[Geometry], dict[str, Any]]]] = {
+    "box": ("add_box", lambda shape: {"dimensions": shape.scale}),
+    "cylinder": ("add_cylinder", lambda shape: {"radius": shape.scale[0], "height": shape.scale[2]}),
+    "ball": ("add_icosphere", lambda shape: {"scale": shape.scale}),
+    "mesh": ("add_mesh_simple", lambda shape: {"vertices": shape.corners, "faces": shape.faces}),
+}
 
 
 class Stage:
@@ -93,23 +102,14 @@ class Stage:
         options: dict[str, Any] = {
             "color": tuple(round(255 * component) for component in solid.colour),
             "opacity": max(solid.opacity, min(_MAX_OPACITY, 1.5 * solid.opacity)),
-            "flat_shading": solid.kind in ("box", "mesh"),
+            "flat_shading": solid.geometry.kind in ("box", "mesh"),
             "position": solid.translation,
             "wxyz": _wxyz(solid.rotation),
             "cast_shadow": False,
             "receive_shadow": False,
         }
-        if solid.kind == "box":
-            self._viser.add_box(path, dimensions=np.array(solid.sizes), **options)
-        elif solid.kind == "cylinder":
-            radius, height = solid.sizes
-            self._viser.add_cylinder(path, radius, height, **options)
-        elif solid.kind == "mesh":
-            self._viser.add_mesh_simple(path, solid.corners, solid.faces, **options)
-        else:
-            # The radii of an ellipsoid, or that of a sphere.
-            x, y, z = np.broadcast_to(solid.sizes, 3).tolist()
-            self._viser.add_icosphere(path, scale=(x, y, z), **options)
+        method, arguments = _METHODS[solid.geometry.kind]
+        getattr(self._viser, method)(path, **arguments(solid.geometry), **options)
 
     def _add_objects(self, middle: Array) -> list[Any]:
         """Draw the objects around the finger; return the frames of the free ones."""

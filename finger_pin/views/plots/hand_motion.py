@@ -7,7 +7,7 @@ from typing import TypeAlias
 import xarray as xr
 from matplotlib.figure import Figure
 
-from finger_pin.mechanism.groups import MUSCLES, STATEFUL, STATELESS
+from finger_pin.mechanism.groups import ACTUATORS
 from finger_pin.typing import Array
 from finger_pin.views.plots.lines import names, series, times, trace
 from finger_pin.views.plots.panels import sheet, stack, title
@@ -58,7 +58,7 @@ def _force_panels(result: xr.Dataset) -> list[Panel]:
     panels = _split_panels(result["tendon_tension"], "tendon", names(result, "tendon"), "tension (N)")
     if "cord_tension" in result:
         panels += _split_panels(result["cord_tension"], "cord", names(result, "cord"), "cord tension (N)")
-    for group in (STATELESS, STATEFUL, MUSCLES):
+    for group in ACTUATORS:
         if f"{group}_force" in result:
             for unit, actuators in actuators_by_unit(result, group).items():
                 label = f"{'torque' if unit == 'N m' else 'force'} ({unit})"

@@ -263,9 +263,9 @@ class Scene:
 
 def _box_corners(visual: Visual, poses: LinkPoses) -> Array:
     """Return the corners of the box around a solid, in all poses of its link."""
-    visual.shape.computeLocalAABB()
-    low, high = visual.shape.aabb_local.min_, visual.shape.aabb_local.max_
-    box = np.array(list(product(*zip(low, high, strict=True)))) @ visual.placement.rotation.T
+    points = visual.geometry.points
+    box = np.array(list(product(*zip(points.min(axis=0), points.max(axis=0), strict=True))))
+    box = box @ visual.placement.rotation.T
     rotation, translation = poses.rotation[..., visual.link, :, :], poses.translation[..., visual.link, None, :]
     return np.asarray((box + visual.placement.translation) @ np.swapaxes(rotation, -1, -2) + translation)
 

@@ -13,7 +13,7 @@ import xarray as xr
 from scipy.spatial.transform import Rotation
 
 from finger_pin.description.objects import Object
-from finger_pin.description.primitives import KINDS, Part
+from finger_pin.description.primitives import KINDS, Geometry
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.simulation.frames import read_scene
 from finger_pin.typing import Array
@@ -158,15 +158,15 @@ class SceneObjects:
         parts = scene_object.parts
         if scene_object.shape == "half_space":
             side, thickness = 2.0 * _PLATE_RADIUS * self.size, _PLATE_THICKNESS * self.size
-            parts = (Part("box", (side, side, thickness), -0.5 * thickness),)
-        for index, part in enumerate(parts):
-            centre = np.array([0.0, 0.0, part.height])
+            parts = ((Geometry("box", (side, side, thickness)), -0.5 * thickness),)
+        for index, (shape, height) in enumerate(parts):
+            centre = np.array([0.0, 0.0, height])
             if scene_object.shape == "half_space":
                 # The part of the plane nearest to the finger.
                 rotation = pin.Quaternion(scene_object.quaternion).toRotationMatrix()
                 centre[:2] = (rotation.T @ (self.middle - scene_object.position))[:2]
             pose = np.eye(3), centre
-            yield Solid(f"object_{name}", f"part{index}", part.kind, part.sizes, *pose, colour, 1.6 * SOLID_OPACITY)
+            yield Solid(f"object_{name}", f"part{index}", shape, *pose, colour, 1.6 * SOLID_OPACITY)
 
 
 def _box_corners(scene_object: Object) -> Array:

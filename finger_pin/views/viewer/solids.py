@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
-import coal
 import numpy as np
-from numpy.typing import NDArray
 
-from finger_pin.exceptions import InputError
+from finger_pin.description.primitives import Geometry
 from finger_pin.mechanism.geometry import TendonGeometry
 from finger_pin.typing import Array
 
@@ -21,8 +19,13 @@ Command = dict[str, Any]
 #: Opacity of solids and grooves, so that the tendons show inside.
 SOLID_OPACITY = 0.28
 _GROOVE_COLOUR = (0.55, 0.62, 0.72)
-# Three.js runs its cylinders along y, others along z.
-_Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+_CYLINDER = {"type": "CylinderGeometry", "radiusTop": 1.0, "radiusBottom": 1.0, "height": 1.0, "radialSegments": 48}
+# Three.js's geometries of unit size, and their rotations: its cylinders are along y.
+_GEOMETRIES: dict[str, tuple[Command, Array]] = {
+    "box": ({"type": "BoxGeometry", "width": 1.0, "height": 1.0, "depth": 1.0}, np.eye(3)),
+    "cylinder": (_CYLINDER, np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])),
+    "ball": ({"type": "SphereGeometry", "radius": 1.0, "widthSegments": 40, "heightSegments": 28}, np.eye(3)),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,26 +35,20 @@ class Solid:
     Attributes:
         frame: Name of the frame: the base, a link or an object.
         name: Of the solid.
-        kind: Box, cylinder, sphere, ellipsoid or mesh.
-        sizes: As `description.primitives.Part` has them, m; none of a mesh.
+        geometry: Its shape, about the origin.
         rotation: Shape (3, 3), from the solid to the frame; cylinders are along z.
         translation: Shape (3,), m, in the frame.
         colour: Red, green and blue, 0 to 1.
         opacity: 0 to 1.
-        corners: Of a mesh, shape (v, 3), m.
-        faces: Triangles of a mesh, indices of corners, shape (f, 3).
     """
 
     frame: str
     name: str
-    kind: str
-    sizes: tuple[float, ...]
+    geometry: Geometry
     rotation: Array
     translation: Array
     colour: tuple[float, float, float]
     opacity: float
-    corners: Array = field(default_factory=lambda: np.zeros((0, 3)))
-    faces: NDArray[np.intp] = field(default_factory=lambda: np.zeros((0, 3), dtype=np.intp))
 
     def command(self, root: str = ROOT, colour: tuple[float, float, float] | None = None) -> Command:
         """Return meshcat's ``set_object`` command.
@@ -60,12 +57,7 @@ class Solid:
             root: Path below which the frame stands.
             colour: In place of the solid's own, if given.
         """
-        rotation = self.rotation
-        if self.kind == "cylinder":
-            rotation = rotation @ _Y_TO_Z
-        elif self.kind == "ellipsoid":
-            # A ball, stretched along its axes.
-            rotation = rotation * np.array(self.sizes)
+        shape, turn = _GEOMETRIES.get(self.geometry.kind) or (_mesh(self.geometry), np.eye(3))
         red, green, blue = (round(255 * float(component)) for component in colour or self.colour)
         material = {
             "type": "MeshPhongMaterial",
@@ -75,25 +67,18 @@ class Solid:
             "opacity": self.opacity,
             "depthWrite": False,
             # Flat shading shows edges where corners have no normals.
-            "flatShading": self.kind == "mesh",
+            "flatShading": self.geometry.kind == "mesh",
         }
         path = f"{root}/{self.frame}/{self.name}"
-        return set_object(path, "Mesh", self._geometry(), material, pose_matrix(rotation, self.translation))
+        matrix = pose_matrix((self.rotation * np.array(self.geometry.scale)) @ turn, self.translation)
+        return set_object(path, "Mesh", shape, material, matrix)
 
-    def _geometry(self) -> Command:
-        if self.kind == "box":
-            return {"type": "BoxGeometry", **dict(zip(("width", "height", "depth"), self.sizes, strict=True))}
-        if self.kind == "cylinder":
-            radius, height = self.sizes
-            ends = {"radiusTop": radius, "radiusBottom": radius}
-            return {"type": "CylinderGeometry", **ends, "height": height, "radialSegments": 48}
-        if self.kind == "mesh":
-            corners = np.round(self.corners, 5).ravel().tolist()
-            attributes = {"position": {"itemSize": 3, "type": "Float32Array", "array": corners}}
-            index = {"type": "Uint32Array", "array": self.faces.ravel().tolist()}
-            return {"type": "BufferGeometry", "data": {"attributes": attributes, "index": index}}
-        radius = 1.0 if self.kind == "ellipsoid" else self.sizes[0]
-        return {"type": "SphereGeometry", "radius": radius, "widthSegments": 40, "heightSegments": 28}
+
+def _mesh(shape: Geometry) -> Command:
+    corners = np.round(shape.corners, 5).ravel().tolist()
+    attributes = {"position": {"itemSize": 3, "type": "Float32Array", "array": corners}}
+    index = {"type": "Uint32Array", "array": shape.faces.ravel().tolist()}
+    return {"type": "BufferGeometry", "data": {"attributes": attributes, "index": index}}
 
 
 def link_names(geometry: TendonGeometry) -> list[str]:
@@ -111,42 +96,19 @@ def link_solids(geometry: TendonGeometry, tube_radius: float) -> Iterator[Solid]
     links = link_names(geometry)
     for visual in geometry.visuals:
         placement, colour = visual.placement, visual.colour[:3]
-        kind, sizes = _primitive(visual.name, visual.shape)
-        mesh = _surface(visual.shape) if kind == "mesh" else ()
         opacity = float(visual.colour[3] * SOLID_OPACITY)
         pose = placement.rotation, placement.translation
-        yield Solid(links[visual.link], visual.name, kind, sizes, *pose, colour, opacity, *mesh)
+        yield Solid(links[visual.link], visual.name, visual.geometry, *pose, colour, opacity)
     for tendon, arc in geometry.arcs:
-        sizes = (max(abs(arc.radius) - tube_radius, 0.5 * tube_radius), 0.8 * geometry.lanes.spacing)
+        radius = max(abs(arc.radius) - tube_radius, 0.5 * tube_radius)
+        shape = Geometry("cylinder", (radius, radius, 0.8 * geometry.lanes.spacing))
         pose, name = (arc.frame, arc.lane * arc.frame[:, 2]), f"groove_{tendon}"
-        yield Solid(links[arc.joint], name, "cylinder", sizes, *pose, _GROOVE_COLOUR, SOLID_OPACITY)
+        yield Solid(links[arc.joint], name, shape, *pose, _GROOVE_COLOUR, SOLID_OPACITY)
 
 
 def root_command(rotation: Array) -> Command:
     """Return meshcat's ``set_transform`` command that turns the base frame into the frame of the scene."""
     return {"type": "set_transform", "path": ROOT, "matrix": pose_matrix(rotation, np.zeros(3))}
-
-
-def _primitive(name: str, shape: Any) -> tuple[str, tuple[float, ...]]:
-    """Return the kind and the sizes of a geometry of Pinocchio."""
-    kind = type(shape).__name__.lower()
-    if isinstance(shape, coal.BVHModelBase):
-        return "mesh", ()
-    if kind == "cylinder":
-        return kind, (shape.radius, 2.0 * shape.halfLength)
-    if kind == "sphere":
-        return kind, (shape.radius,)
-    if kind == "ellipsoid":
-        return kind, tuple(shape.radii)
-    if kind == "box":
-        return kind, tuple((2.0 * shape.halfSide).tolist())
-    raise InputError(f"visual {name}", "must be a box, a cylinder, a sphere, an ellipsoid or a mesh", kind)
-
-
-def _surface(shape: Any) -> tuple[Array, NDArray[np.intp]]:
-    """Return the corners and the faces of a mesh of Pinocchio."""
-    faces = [[triangle[i] for i in range(3)] for triangle in map(shape.tri_indices, range(shape.num_tris))]
-    return np.asarray(shape.vertices()), np.array(faces, dtype=np.intp).reshape(-1, 3)
 
 
 def set_object(path: str, kind: str, shape: Command, material: Command, matrix: list[float] | None = None) -> Command:

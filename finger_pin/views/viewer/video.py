@@ -6,7 +6,6 @@ import contextlib
 import os
 import shutil
 from dataclasses import dataclass
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -34,7 +33,6 @@ from finger_pin.views.viewer.solids import Solid, link_names, link_solids
 _BACKGROUND, _INK, _DIM_INK, _TRACE_COLOUR = "#1B2330", "#E8ECF2", "#9AA6B6", "#FF86B4"
 #: From the finger to the camera, in the scene, where z is up; the page's oblique view.
 _CAMERA_DIRECTION = (0.42, -1.0, 0.5)
-_CIRCLE_ANGLES = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
 #: Pixels of a film's width, and of that of a GIF, which is large for its size.
 _WIDTH, _GIF_WIDTH = 1200, 720
 _FIGURE_SIZE = (10.0, 6.0)
@@ -134,7 +132,7 @@ class _Body:
     @classmethod
     def from_solid(cls, solid: Solid, links: list[str]) -> _Body:
         """Return the body of a solid, whose frame is one of the links."""
-        corners = _hull_points(solid) @ solid.rotation.T + solid.translation
+        corners = solid.geometry.points @ solid.rotation.T + solid.translation
         return cls(links.index(solid.frame), corners, (*solid.colour, solid.opacity))
 
 
@@ -248,28 +246,3 @@ class _Film:
         bar.ax.tick_params(colors=_DIM_INK, labelcolor=_INK)
         bar.set_label("tendon tension (N)", color=_INK)
         bar.outline.set_visible(False)
-
-
-def _hull_points(solid: Solid) -> Array:
-    """Return points whose hull is, or looks like, a solid at the origin, shape (p, 3), m."""
-    if solid.kind == "mesh":
-        return solid.corners
-    if solid.kind == "box":
-        return np.array(list(product(*((-0.5 * side, 0.5 * side) for side in solid.sizes))))
-    if solid.kind == "cylinder":
-        return _rims(*solid.sizes)
-    # The radii of an ellipsoid, or that of a sphere.
-    return np.asarray(_sphere_points() * solid.sizes)
-
-
-def _sphere_points() -> Array:
-    """Return points of the unit sphere, shape (p, 3)."""
-    polar_angles = np.linspace(0.0, np.pi, 13)
-    points = np.array([_rims(np.sin(angle), 2.0 * np.cos(angle))[: len(_CIRCLE_ANGLES)] for angle in polar_angles])
-    return points.reshape(-1, 3)
-
-
-def _rims(radius: float, height: float) -> Array:
-    """Return the two rims of a cylinder about z, shape (2 r, 3)."""
-    rim = radius * np.stack([np.cos(_CIRCLE_ANGLES), np.sin(_CIRCLE_ANGLES)], axis=-1)
-    return np.array([[x, y, z] for z in (-0.5 * height, 0.5 * height) for x, y in rim])
