@@ -153,7 +153,7 @@ def test_statics_of_any_finger_are_finite_and_of_the_documented_shapes(descripti
     # J^T F, (6), by differences of the fingertip's place.
     tip = finger.rigid_body.tip_position
     turned = [load @ (tip(position + each) - tip(position - each)) / 2e-6 for each in 1e-6 * np.eye(count)]
-    np.testing.assert_allclose(pushed.external_torque, turned, atol=1e-9)
+    np.testing.assert_allclose(pushed["external_torque"], turned, atol=1e-9)
     assert pushed.rate.shape == (finger.layout.size,)
     reactions = joint_reactions(result)
     assert reactions.full.shape == (3, count) and np.isfinite(reactions.full).all()
