@@ -21,6 +21,7 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.exceptions import InputError
 from finger_pin.exchange.mjcf_bodies import BodyWriter
 from finger_pin.exchange.mjcf_friction import add_friction_elements
+from finger_pin.exchange.mjcf_geoms import CONTACTS_LEFT_OUT
 from finger_pin.exchange.mjcf_tree import tree_to_mjcf
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.mechanism.urdf import TENSION_LIMIT
@@ -45,6 +46,7 @@ _HEADER = """
   Left out, because MuJoCo has no counterpart:{rough}{held}
   - the cut of a delivered tension at zero (viscous drag can make a tendon push when its control is near zero);
   - {stops};
+  - {contacts};
   - an external force at the fingertip: apply it to the site "{tip}".{servos}
   Added: controls are clamped to 0 to {limit:g} N; shapes touch other objects, not each other.
 """
@@ -137,6 +139,7 @@ def _header(description: FingerDescription, tendons: Tendons, massless: bool, fr
     springs = [joint.spring.hysteresis for joint in description.joints.values() if joint.spring]
     notes["held"] = _HYSTERESIS_LEFT_OUT if any(springs) or tendons.hysteresis.any() else ""
     notes["stops"] = _SOFT_STOPS if limits else _NO_STOPS
+    notes["contacts"] = CONTACTS_LEFT_OUT
     notes["servos"] = _SERVOS_LEFT_OUT if description.actuators else ""
     if tendons.routing.passive:
         notes["passive"] = _WITHOUT_MASS if massless else _WITH_MASS

@@ -115,6 +115,13 @@ def add_pairs(
         ET.SubElement(contact, "pair", geom_names | friction | softness)
 
 
+#: What of a surface is not written.
+CONTACTS_LEFT_OUT = (
+    "stiction and bristles of contacts: stiction_ratio, tangential_stiffness, lag, stribeck_velocity, floor; with an "
+    "exponent other than 1 their stiffness and damping are MuJoCo's own"
+)
+
+
 def _friction(surface: Surface | None) -> dict[str, str]:
     surface = surface or Surface()
     return _rubbing(surface.friction, surface.torsion, numbers(surface.friction, surface.torsion or 0.005, 1e-4))

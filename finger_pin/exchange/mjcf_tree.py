@@ -20,7 +20,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.exchange.mjcf_bodies import BodyWriter
 from finger_pin.exchange.mjcf_compliance import IMPEDANCE, soft
 from finger_pin.exchange.mjcf_drives import add_actuators, add_equalities, add_keyframes
-from finger_pin.exchange.mjcf_geoms import HIDDEN, IDLE, add_geom, add_objects, add_pairs
+from finger_pin.exchange.mjcf_geoms import CONTACTS_LEFT_OUT, HIDDEN, IDLE, add_geom, add_objects, add_pairs
 from finger_pin.mechanism.body_places import rotation
 from finger_pin.mechanism.xml_numbers import numbers
 
@@ -72,6 +72,8 @@ def _header(description: FingerDescription) -> str:
         left_out += ["what springs of joints hold against their motion (hysteresis);"]
     if any(each.slack is not None and each.damping for each in description.tree.tendons.values()):
         left_out += ["that cords with slack are not damped while they are slack: dampers act at any length;"]
+    if any(body.shapes for body in description.tree.bodies.values()) or description.tree.objects:
+        left_out += [f"{CONTACTS_LEFT_OUT};"]
     left_out += (
         ["paths of joints, whose bodies are mocap bodies: lead them by mocap_pos;"] if description.tree.on_paths else []
     )

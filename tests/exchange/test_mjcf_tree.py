@@ -7,6 +7,7 @@ from mujoco_models import HEAD, MODELS, ROUTED
 import finger_pin as fp
 from finger_pin.description.demo_motion import demo_motion
 from finger_pin.description.loading import read_scenario
+from finger_pin.description.surface import Surface
 
 PHALANX = '<geom type="capsule" size="0.006" fromto="0 0 0 {0} 0 0" mass="0.03" contype="0" conaffinity="0"/>'
 BODY = """<body name="near" pos="0 0 0.1" euler="0.2 0 0.1"><joint name="mcp" axis="0 -1 0" ref="0.3" range="-0.2 1"
@@ -229,3 +230,16 @@ def test_friction_of_a_tree_is_added_to_what_is_written_without():
     spec = mujoco.MjSpec.from_string(fp.to_mjcf(hand))
     add_friction(spec, {"cord": {"coulomb": 0.3}})
     assert spec.compile().nplugin == 1
+
+
+def test_every_number_of_a_surface_is_written_or_named_as_left_out():
+    def written(**surface):
+        ball = {"shape": "sphere", "radius": 0.01, "mass": 0.02, "position": [0.0, 0.0, 0.2], "surface": surface}
+        text = fp.to_mjcf(arm(objects={"ball": ball, "floor": {"shape": "half_space", "position": [0.0, 0.0, -1.0]}}))
+        return text[: text.index("-->")], text[text.index("-->") :]
+
+    given = {"torsion": 1e-3}
+    header, plain = written(**given)
+    for name, field in Surface.model_fields.items():
+        number = 1.2 if name == "exponent" else 1.5 * given.get(name, field.default)
+        assert written(**given | {name: number})[1] != plain or name in header, name
