@@ -46,7 +46,7 @@ class TreeSolid(Sized):
     kind_entry: ClassVar[str] = "kind"
 
     kind: Annotated[str, choice(*SOLIDS, "mesh")] = quantity(
-        ..., unit="1", source="design", doc="sphere, capsule, cylinder, box, ellipsoid or mesh."
+        ..., unit="1", source="design", doc=f"{', '.join(SOLIDS)} or mesh."
     )
     mesh: Name | None = Field(None, description="Of a mesh, which one of the tree's.")
     position: Annotated[Triple, BODY_POINT] = quantity(
