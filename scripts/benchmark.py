@@ -25,6 +25,7 @@ STAGES = {
     "work-precision": "work_precision",
     "step-interface": "stepping",
     "joints": "chains",
+    "growth": "growth",
     "hand": "hands",
     "contact": "contacts",
     "mujoco": "mujoco_loop",

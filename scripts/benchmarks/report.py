@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from benchmarks import identification, learning, mujoco_friction, mujoco_warp_friction, prepared
+from benchmarks import growth, identification, learning, mujoco_friction, mujoco_warp_friction, prepared
 from benchmarks.targets import Target
 from benchmarks.text_tables import table
 from benchmarks.work_precision import OURS
@@ -27,6 +27,7 @@ def text(stages: Mapping[str, Any], reached: Sequence[Target], quick: bool) -> s
     for name, lines in (
         ("step-interface", _stepping),
         ("joints", _joints),
+        ("growth", growth.lines),
         ("hand", _hand),
         ("contact", _contact),
         ("mujoco", _mujoco),

@@ -127,6 +127,17 @@ def test_generated_chains_have_one_tendon_more_than_joints_and_follow_their_refe
     assert abs(result["tracking_error"]).max() < 0.3
 
 
+@pytest.mark.parametrize("links", [1, 4])
+def test_hanging_chains_without_friction_move_as_in_mujoco(load, links):
+    pytest.importorskip("mujoco")
+    growth, settled = load("benchmarks.growth"), load("benchmarks.runs").settled
+    spent = []
+    scenario = settled(growth.chain(links, 0.1, "none", amplitude=0.0), rtol=1e-9, atol_scale=1e-10)
+    path = growth.simulated(scenario, spent)()
+    assert abs(path).max() > 4e-3 and spent[0][1] > 0
+    np.testing.assert_allclose(path, growth.stepped(links, 0.1, 1e-4, "RK4")(), rtol=0.0, atol=1e-8)
+
+
 def test_mujoco_s_own_loop_repeats_the_python_loop(load, brief):
     pytest.importorskip("mujoco")
     compared = load("benchmarks.mujoco_loop")
@@ -157,6 +168,10 @@ def stages():
     joint = {"states": 5, "wall_time": 0.1, "real_time_factor": 20.0, "steps": 9, "time_per_step": 1e-5}
     spent = ("integration", "run", "simulate", *(f"short {each}" for each in ("steps", "run", "changed", "simulate")))
     runs = {"reversals": dict.fromkeys((*spent, "load"), 1e-3)}
+    chain = {"links": 64, "friction": "none", "motion": 0.25, "whole": 0.2, "steps": 124, "step": 6e-4, "mujoco": 6e-5}
+    equal = {"RK4": {"step": 1e-3, "time": 0.015, "relation": ">=", "over_whole": 0.75, "over_steps": 5.0}}
+    precision = {"links": 8, "motion": 1.0, "aim": "rtol 0.0001", "equal": equal}
+    precision |= {"points": [["rtol 0.0001", 1e-7, 0.02, 3e-3]]}
     simulator = {"times": {"varied slowly": 7e-5}, "errors": {"varied slowly": 9e-4}}
     prepared = {"runs": runs, "simulator": simulator}
     job = {"options": [], "first": 31.0, "first_processor_time": 30.0, "first_memory": 2**20}
@@ -166,6 +181,7 @@ def stages():
         | {"real_time_factor_stepping": 40.0, "error": 1e-5, "worst": 1e-4},
         "joints": {"duration": 2.0, "rtol": 1e-5, "exponent": 1.5}
         | {"rows": [{"joints": n, "time_per_textbook_evaluation": 2e-4, **joint} for n in (1, 2, 3)]},
+        "growth": {"rows": [chain], "precision": precision},
         "hand": {"duration": 4.0, "joints": 20, "tendons": 25, "fingers": 5}
         | {
             "cores": {
@@ -240,6 +256,8 @@ def test_the_report_judges_every_target_and_the_figures_are_written(load, stages
     assert verdicts["main job, first run"] is False
     output = capsys.readouterr().out
     assert "pass" in output and "FAIL" in output and "Rodas5P" in output
+    assert "600.0 us  60.0 us   10.0" in output and "step <= 1e+03 us" in output
+    assert ">= 0.75 of simulate(), 5 of its steps" in output
     assert "all tendons         24.00 ms  +20 %, 44 frictions" in output
     assert "2 of 3 searches end at the best" in output and "2 for 1, 1.8 for 3, 4 for 6 numbers" in output
 
