@@ -46,21 +46,26 @@ def test_no_step_over_a_reversal_of_friction_errs_by_more_than_three_tolerances(
 
 
 @pytest.mark.slow
-def test_friction_above_what_it_can_bear_does_not_grow_at_a_loose_tolerance_either():
+def test_friction_above_what_it_can_bear_does_not_grow_at_loose_tolerances_either():
     """A tendon goes slack and rings: by (9a) |F^s|' <= sigma_0 |v| (1 - |F^s| / level)."""
     light = {f"finger.actuators.*.motor.friction.{name}": 0.0 for name in ("by_load", "stribeck_by_load")}
-    settings = {"simulation.duration": 5.2, "simulation.rtol": 1e-3, "simulation.atol_scale": 1e-3}
     # Gears without losses by load and little damping let it ring.
-    scenario = fp.load_scenario("servo", settings | light | {"controller.damping": 0.1})
-    setup = Setup.from_scenario(scenario)
-    exact = scenario.updated(simulation={"rtol": 1e-9, "atol_scale": 1e-9})
-    loose, tight = setup.integrate(), setup.integrate(scenario=exact)
-    ends = loose.breakpoints
-    signals = setup.loop.evaluate(ends, loose.interpolate(ends)).finger
-    bent, bearable = np.abs(signals.at_first_place("state")), signals.at_first_place("level")
-    beyond = (bent > 2.0 * bearable)[:-1] & (bent > 2.0 * bearable)[1:]
-    assert beyond.any()
-    assert np.sum(np.maximum(np.diff(bent, axis=0), 0.0), where=beyond) < 0.02
-    times = np.linspace(0.0, 5.2, 1001)
-    errors = (loose.interpolate(times) - tight.interpolate(times))[:, :4]
-    assert np.sqrt(np.mean(errors**2)) < 3e-4
+    servo = fp.load_scenario("servo", light | {"simulation.duration": 5.2, "controller.damping": 0.1})
+    setup, times, growth = Setup.from_scenario(servo), np.linspace(0.0, 5.2, 1001), []
+
+    def motion(tolerance):
+        return setup.integrate(scenario=servo.updated(simulation={"rtol": tolerance, "atol_scale": tolerance}))
+
+    tight = motion(1e-9)
+    for tolerance in (0.7e-3, 0.9e-3, 1e-3, 1.1e-3, 1.3e-3):
+        loose = motion(tolerance)
+        ends = loose.breakpoints
+        signals = setup.loop.evaluate(ends, loose.interpolate(ends)).finger
+        bent, bearable = np.abs(signals.at_first_place("state")), signals.at_first_place("level")
+        beyond = (bent > 2.0 * bearable)[:-1] & (bent > 2.0 * bearable)[1:]
+        assert beyond.any()
+        growth.append(np.sum(np.maximum(np.diff(bent, axis=0), 0.0), where=beyond))
+        errors = (loose.interpolate(times) - tight.interpolate(times))[:, :4]
+        assert np.sqrt(np.mean(errors**2)) < 3e-4
+    # What it can bear may rise and fall within a step, where it grows as it should.
+    assert np.median(growth) < 0.005
