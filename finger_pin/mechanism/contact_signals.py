@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from operator import attrgetter, methodcaller
 
 import numpy as np
@@ -39,6 +40,8 @@ def _bend(signals: FingerSignals) -> Array:
     return bend.reshape(*bend.shape[:-1], len(scene.contacts.names), scene.contacts.law.arms - 1)
 
 
+# What follows from the state alone needs no evaluation.
+_of_state = partial(Quantity, of_finger=False)
 #: Signals of contacts and of free objects.
 CONTACT_SECTIONS = (
     Section(
@@ -98,16 +101,16 @@ CONTACT_SECTIONS = (
         "With free objects",
         lambda finger: finger.scene and finger.scene.free,
         {
-            "object_position": Quantity(
+            "object_position": _of_state(
                 _OBJECT, "m", "position of a free object", _split("object_pose", POSE, slice(0, 3))
             ),
-            "object_orientation": Quantity(
+            "object_orientation": _of_state(
                 ("object", "quaternion"), "1", "orientation of a free object, a unit quaternion", _orientation
             ),
-            "object_velocity": Quantity(
+            "object_velocity": _of_state(
                 _OBJECT, "m/s", "velocity of a free object", _split("object_velocity", VELOCITY, slice(0, 3))
             ),
-            "object_angular_velocity": Quantity(
+            "object_angular_velocity": _of_state(
                 _OBJECT,
                 "rad/s",
                 "angular velocity of a free object",
