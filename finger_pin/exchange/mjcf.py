@@ -139,7 +139,7 @@ def _header(description: FingerDescription, tendons: Tendons, massless: bool, fr
     springs = [joint.spring.hysteresis for joint in description.joints.values() if joint.spring]
     notes["held"] = _HYSTERESIS_LEFT_OUT if any(springs) or tendons.hysteresis.any() else ""
     notes["stops"] = _SOFT_STOPS if limits else _NO_STOPS
-    notes["contacts"] = CONTACTS_LEFT_OUT
+    notes["contacts"] = ";\n  - ".join(CONTACTS_LEFT_OUT)
     notes["servos"] = _SERVOS_LEFT_OUT if description.actuators else ""
     if tendons.routing.passive:
         notes["passive"] = _WITHOUT_MASS if massless else _WITH_MASS

@@ -117,8 +117,8 @@ def add_pairs(
 
 #: What of a surface is not written.
 CONTACTS_LEFT_OUT = (
-    "stiction and bristles of contacts: stiction_ratio, tangential_stiffness, lag, stribeck_velocity, floor; with an "
-    "exponent other than 1 their stiffness and damping are MuJoCo's own"
+    "stiction and bristles of contacts: stiction_ratio, tangential_stiffness, lag, stribeck_velocity, floor",
+    "stiffness and damping of contacts whose exponent is not 1, which are MuJoCo's own",
 )
 
 

@@ -73,7 +73,7 @@ def _header(description: FingerDescription) -> str:
     if any(each.slack is not None and each.damping for each in description.tree.tendons.values()):
         left_out += ["that cords with slack are not damped while they are slack: dampers act at any length;"]
     if any(body.shapes for body in description.tree.bodies.values()) or description.tree.objects:
-        left_out += [f"{CONTACTS_LEFT_OUT};"]
+        left_out += [f"{line};" for line in CONTACTS_LEFT_OUT]
     left_out += (
         ["paths of joints, whose bodies are mocap bodies: lead them by mocap_pos;"] if description.tree.on_paths else []
     )

@@ -46,7 +46,10 @@ def find_movers(
     """
     moves = [_moves(row, chains.parents) for row in bodies]
     acting = [_acting(*each) for each in zip(number, moves, strict=True)]
-    turning = _turning(paths, number, acting, [_is_long(*each, chains) for each in zip(bodies, points, strict=True)])
+    # Contacts have no legs beside them, and there may be thousands.
+    spans = ((piece.shape.columns == 1, *each) for piece, *each in zip(number, bodies, points, strict=True))
+    is_long = [not is_span or _is_long(row, ends, chains) for is_span, row, ends in spans]
+    turning = _turning(paths, number, acting, is_long)
     entries = [_entries(*each) for each in zip(moves, acting, turning, strict=True)]
     return entries, np.array([np.count_nonzero(each) for each in acting], dtype=np.int64)
 
