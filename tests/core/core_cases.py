@@ -213,6 +213,8 @@ class Bound:
 
     def solve(self, time, x, g):
         """Return the rate, the matrix that solves (g - J) u = r + f_t s, by columns (r | s), and if there is one."""
+        # Compiled code checks no sizes, and writes as many numbers as its own state has.
+        assert len(x) == len(self.model.state), "a state with quaternions is another one in compiled code"
         rate = np.zeros(len(x))
         columns = np.zeros((len(x) + 1, len(x)))
         solved = condensed(self._bound.address, time, x, g, rate, np.zeros(len(x) + 1), columns)
