@@ -48,7 +48,7 @@ class Quantity(NamedTuple):
 
     @property
     def attributes(self) -> dict[str, str]:
-        """Unit, name, frame of what has components, equation, and its part in the account."""
+        """Attributes of the variable: unit, name, equation, its frame if it has components, its part in the account."""
         metadata = {"units": self.units, "long_name": self.long_name}
         if {"axis", "quaternion"} & {*self.dims}:
             metadata["frame"] = self.frame

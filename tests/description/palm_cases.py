@@ -1,8 +1,7 @@
 """A tree of bodies, the places at which it stands on a palm, and scenarios of it."""
 
-import copy
-
 import numpy as np
+from changed_tables import with_entries
 
 import finger_pin as fp
 from finger_pin.description.loading import read_scenario
@@ -119,17 +118,7 @@ def as_bodies(name):
 
 def changed(**entries):
     """Return the tree with entries at keys whose dots are double underscores; None takes one away."""
-    table = copy.deepcopy(TREE)
-    for key, value in entries.items():
-        *path, last = key.split("__")
-        inner = table
-        for part in path:
-            inner = inner[part]
-        if value is None:
-            del inner[last]
-        else:
-            inner[last] = value
-    return table
+    return with_entries(TREE, entries)
 
 
 def states(finger, count=8):

@@ -1,9 +1,8 @@
 """Trees of bodies: what is refused, by the name of its entry."""
 
-import copy
-
 import numpy as np
 import pytest
+from changed_tables import with_entries
 
 import finger_pin as fp
 from finger_pin.description.meshes import Mesh
@@ -37,17 +36,7 @@ CORD = {"joints": {"hinge": 0.01}, "stiffness": 1e3, "slack": 0.0}
 
 def changed(**entries):
     """Return the description with entries at keys whose dots are double underscores; None takes one away."""
-    table = copy.deepcopy(FINGER)
-    for key, value in entries.items():
-        *path, last = key.split("__")
-        inner = table
-        for part in path:
-            inner = inner[part]
-        if value is None:
-            del inner[last]
-        else:
-            inner[last] = value
-    return validate(fp.FingerDescription, table, ("finger",))
+    return validate(fp.FingerDescription, with_entries(FINGER, entries), ("finger",))
 
 
 def test_the_tree_itself_is_taken():
