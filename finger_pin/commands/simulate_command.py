@@ -43,6 +43,10 @@ def simulate(
     mujoco: Annotated[
         Path | None, typer.Option(metavar="XML", help="Instead of a scenario: move the hand of a MuJoCo model.")
     ] = None,
+    meshes: Annotated[
+        str | None,
+        typer.Option(metavar="KIND", help="Of --mujoco: fit, none or a kind for its meshes; or NAME=KIND,NAME=KIND."),
+    ] = None,
     variables: Annotated[
         str | None, typer.Option(metavar="NAMES", help="Variables to store, such as joint_position,tendon_tension.")
     ] = None,
@@ -59,15 +63,10 @@ def simulate(
             raise invalid("--list", f"lists all there is; leave out {beside}")
         print_text(listing())
         return
-    from finger_pin.description.loading import load_scenario
     from finger_pin.simulation.convergence import scenario_to_repeat
 
-    loaded = (
-        load_scenario("fig6" if scenario is None else scenario, changes)
-        if mujoco is None
-        else _mujoco_scenario(mujoco, changes, quiet)
-    )
-    output = output or Path("results", default_name(loaded, settings, duration, method))
+    loaded = _load("fig6" if scenario is None else scenario, mujoco, meshes, changes, quiet)
+    output = output or Path("results", default_name(loaded, settings, duration, method, meshes))
     if check:
         scenario_to_repeat(loaded)
     names = None if variables is None else _read_variables(variables, loaded)
@@ -129,7 +128,23 @@ def _read_variables(text: str, scenario: Scenario) -> list[str]:
     return names
 
 
-def _mujoco_scenario(path: Path, changes: dict[str, Any], quiet: bool) -> Scenario:
+def _load(scenario: str, mujoco: Path | None, meshes: str | None, changes: dict[str, Any], quiet: bool) -> Scenario:
+    """Return a scenario by its name, or that of a MuJoCo model, whose meshes become what a text says."""
+    from finger_pin.description.loading import load_scenario
+
+    if mujoco is None:
+        if meshes is not None:
+            raise invalid("--meshes", "has no effect without --mujoco")
+        return load_scenario(scenario, changes)
+    text = "fit" if meshes is None else meshes
+    pairs = [each.partition("=") for each in text.split(",")]
+    by_name = {name.strip(): kind.strip() for name, _, kind in pairs}
+    if len(by_name) < len(pairs):
+        raise invalid("--meshes", f"{text}: names one twice")
+    return _mujoco_scenario(mujoco, by_name if "=" in text else text, changes, quiet)
+
+
+def _mujoco_scenario(path: Path, meshes: str | dict[str, str], changes: dict[str, Any], quiet: bool) -> Scenario:
     """Return a scenario that moves the hand of a MuJoCo model; print the elements that are not carried over."""
     from finger_pin.description.demo_motion import demo_motion, idle_inputs
     from finger_pin.description.loading import read_scenario
@@ -140,7 +155,7 @@ def _mujoco_scenario(path: Path, changes: dict[str, Any], quiet: bool) -> Scenar
         if not quiet:
             # The printed list has them.
             warnings.simplefilter("ignore", LeftOutWarning)
-        description = from_mujoco(path, path.stem)
+        description = from_mujoco(path, path.stem, meshes=meshes)
     if not quiet and description.tree.left_out:
         print_text("\n".join(["Not carried over:", *(f"  {line}" for line in description.tree.left_out), ""]))
     if not quiet and (idle := idle_inputs(description)):
@@ -148,9 +163,12 @@ def _mujoco_scenario(path: Path, changes: dict[str, Any], quiet: bool) -> Scenar
     return read_scenario(demo_motion(description), changes)
 
 
-def default_name(scenario: Scenario, settings: list[str], duration: str | None, method: str | None) -> str:
+def default_name(
+    scenario: Scenario, settings: list[str], duration: str | None, method: str | None, meshes: str | None
+) -> str:
     """Return the name of the folder of results: the scenario's, and its overrides."""
-    short = [f"{name}={text}" for name, text in (("duration", duration), ("method", method)) if text is not None]
+    options = ("duration", duration), ("method", method), ("meshes", meshes)
+    short = [f"{name}={text}" for name, text in options if text is not None]
     return folder_name(scenario.name, *(each for each in settings if each.partition("=")[0].strip() != "name"), *short)
 
 

@@ -14,8 +14,6 @@ from typing import Any
 import numpy as np
 
 from finger_pin.description.finger_description import FingerDescription
-from finger_pin.description.meshes import Mesh
-from finger_pin.description.primitives import SOLIDS
 from finger_pin.description.tree_parts import Tip
 from finger_pin.description.validation import MOST_ANGLE, validate
 from finger_pin.exceptions import InputError, LeftOutWarning
@@ -24,22 +22,24 @@ from finger_pin.exchange.mujoco_compliance import read_stops
 from finger_pin.exchange.mujoco_equalities import linked_bodies, read_equalities
 from finger_pin.exchange.mujoco_free import FreeBodies, MocapBodies
 from finger_pin.exchange.mujoco_keyframes import read_keyframes
+from finger_pin.exchange.mujoco_meshes import Meshes
 from finger_pin.exchange.mujoco_names import Names, Table, entry_name, quaternion, unused_name
 from finger_pin.exchange.mujoco_overlay import add_tendons
 from finger_pin.exchange.mujoco_shapes import Shapes
-from finger_pin.exchange.mujoco_sizes import KIND_OF_GEOM, described_sizes, geom_kind
 from finger_pin.exchange.mujoco_tendons import TendonReader, passed_bodies
 from finger_pin.exchange.mujoco_unsupported import ElementReader, LeftOutElements, apply_flags, within_margin
 from finger_pin.mechanism.body_places import rotation
 from finger_pin.version import installing
 
 _LEAST_FRICTION = 1e-7
-# Groups from this one on are hidden in MuJoCo's viewer, unless one asks for them.
-_FIRST_HIDDEN_GROUP = 3
 
 
 def from_mujoco(
-    model: Any, name: str = "hand", *, tendons: Mapping[str, Mapping[str, Any]] | str | Path | None = None
+    model: Any,
+    name: str = "hand",
+    *,
+    tendons: Mapping[str, Mapping[str, Any]] | str | Path | None = None,
+    meshes: Mapping[str, str] | str = "fit",
 ) -> FingerDescription:
     """Return the description of a MuJoCo model, to be simulated, written with `to_toml` and changed by keys.
 
@@ -59,9 +59,14 @@ def from_mujoco(
         name: Of the hand.
         tendons: Tendons to lay over a model that has none, or not all; see `add_tendons`. The model has to be a file
             then, or a `mujoco.MjSpec`.
+        meshes: What touches in the place of meshes that collide: with ``fit`` the primitive that fits the convex hull
+            of each best, which is listed in ``tree.left_out`` with its distance; with ``none`` nothing; or a kind for
+            all: sphere, box, capsule, cylinder or ellipsoid. A mapping gives one of these to geoms, meshes or bodies by
+            name, and ``fit`` to others.
 
     Raises:
-        InputError: If it is neither, MuJoCo refuses the file, or it has ball joints or nothing that drives it.
+        InputError: If it is neither, MuJoCo refuses the file, it has ball joints or nothing that drives it, or there is
+            no such choice for meshes, or no mesh that collides of such a name.
     """
     plugins: list[str] = []
     try:
@@ -85,7 +90,7 @@ def from_mujoco(
         raise InputError("model", "must be a file or a mujoco.MjSpec to lay tendons over it", type(model).__name__)
     if not isinstance(model, mujoco.MjModel):
         raise InputError("model", "must be a mujoco.MjModel, or the path of an XML file", type(model).__name__)
-    reader = _Reader(mujoco, model, plugins)
+    reader = _Reader(mujoco, model, plugins, meshes)
     description = reader.with_tips(validate(FingerDescription, reader.table(name), ("finger",)))
     if moving := reader.left_out.moving_lines():
         warnings.warn(LeftOutWarning(f"{name}: not carried over: {'; '.join(moving)}"), stacklevel=2)
@@ -95,10 +100,12 @@ def from_mujoco(
 class _Reader:
     """Reader of a MuJoCo model, element by element."""
 
-    def __init__(self, mujoco: Any, model: Any, plugins: list[str]) -> None:
-        self.mujoco, self.model = mujoco, apply_flags(mujoco, model)
-        model = self.model
+    def __init__(self, mujoco: Any, model: Any, plugins: list[str], meshes: Mapping[str, str] | str) -> None:
+        model = apply_flags(mujoco, model)
         self.left_out, self.names = LeftOutElements(mujoco, model), Names.from_model(model, plugins)
+        self.meshes = Meshes(ElementReader(mujoco, model, self.names, self.left_out), meshes)
+        self.mujoco, self.model = mujoco, self.meshes.model
+        model = self.model
         self._reader = ElementReader(mujoco, model, self.names, self.left_out)
         self.shapes = Shapes(self._reader)
         kinds = mujoco.mjtJoint
@@ -147,7 +154,7 @@ class _Reader:
                 "keyframes": keyframes,
                 "objects": objects,
                 "touching": pairs,
-                "meshes": self._meshes(bodies),
+                "meshes": self.meshes.surfaces(bodies),
                 "left_out": self.left_out.lines(),
             },
         }
@@ -183,7 +190,7 @@ class _Reader:
     def _world_body(self) -> Table:
         """Return the body that has the shapes of the world; none without any."""
         shapes = self.shapes.body_shapes(0)
-        return {self.names.bodies[0]: {"shapes": shapes, "solids": self._solids(0)}} if shapes else {}
+        return {self.names.bodies[0]: {"shapes": shapes, "solids": self.meshes.solids(0)}} if shapes else {}
 
     def _body(self, i: int) -> Table:
         model = self.model
@@ -193,7 +200,7 @@ class _Reader:
             "orientation": quaternion(model.body_quat[i]),
             # A motion that is prescribed takes no mass.
             **({} if i in self.mocap else self._inertia(i)),
-            "solids": self._solids(i),
+            "solids": self.meshes.solids(i),
             "shapes": self.shapes.body_shapes(i),
         }
 
@@ -206,34 +213,6 @@ class _Reader:
             "centre": model.body_ipos[i].tolist(),
             "inertia": [float(moments[indices]) for indices in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))],
         }
-
-    def _solids(self, body: int) -> Table:
-        """Return the visible geoms of a body, or all if none is; meshes of moving bodies only."""
-        model, solids = self.model, {}
-        geoms = np.flatnonzero(model.geom_bodyid == body)
-        visible = geoms[model.geom_group[geoms] < _FIRST_HIDDEN_GROUP]
-        for i in visible if len(visible) else geoms:
-            kind = geom_kind(self.mujoco, model, int(i))
-            pose = {"position": model.geom_pos[i].tolist(), "orientation": quaternion(model.geom_quat[i])}
-            if (solid := KIND_OF_GEOM.get(kind)) in SOLIDS:
-                solids[self.names.geoms[i]] = {"kind": solid, **described_sizes(solid, model.geom_size[i]), **pose}
-            elif kind == "mesh" and model.body_weldid[body]:
-                # A forearm that stands still would be in the way.
-                name = self.names.meshes[model.geom_dataid[i]]
-                solids[self.names.geoms[i]] = {"kind": "mesh", "mesh": name, **pose}
-        return solids
-
-    def _meshes(self, bodies: list[int]) -> Table:
-        """Return the meshes that the solids of bodies are made of."""
-        model, names = self.model, self.names.meshes
-        used_meshes = {solid.get("mesh") for i in bodies for solid in self._solids(i).values()}
-        meshes = {}
-        for i in range(model.nmesh):
-            points = slice(model.mesh_vertadr[i], model.mesh_vertadr[i] + model.mesh_vertnum[i])
-            faces = slice(model.mesh_faceadr[i], model.mesh_faceadr[i] + model.mesh_facenum[i])
-            if names[i] in used_meshes:
-                meshes[names[i]] = Mesh.packed(model.mesh_vert[points], model.mesh_face[faces])
-        return meshes
 
     def _joint(self, i: int) -> Table:
         model = self.model

@@ -17,6 +17,8 @@ Pair = tuple[int, int]
 # Greatest number of pairs to name; more are counted.
 _MAX_NAMED = 4
 _TOLERANCE = 1e-9
+# Less than this, 1/kg, is rounding: of a body about whose mass centre a joint turns.
+_LEAST_MOBILITY = 1e-12
 # MuJoCo's least number.
 _LEAST_MIX = 1e-15
 
@@ -113,7 +115,7 @@ class Pairs(ElementReader):
         """
         model, bodies = self.model, self.model.geom_bodyid[[*pair]]
         mobility = float(np.sum(model.body_invweight0[bodies, 0]))
-        if not mobility:
+        if mobility < _LEAST_MOBILITY:
             return Surface().stiffness, Surface().damping
         stiffness, damping = contact_numbers(self, *self._solver_parameters(pair), mobility)
         if model.opt.cone == self.mujoco.mjtCone.mjCONE_PYRAMIDAL and friction[0]:

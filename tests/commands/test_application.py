@@ -186,6 +186,7 @@ def test_an_option_that_another_one_makes_idle_is_refused_by_every_command_that_
     ("name", "arguments", "says"),
     [
         ("simulate", ["reversals", "--mujoco", "hand.xml"], "SCENARIO: reversals: --mujoco takes its place"),
+        ("simulate", ["--meshes", "box"], "--meshes: has no effect without --mujoco"),
         ("simulate", ["--duration", "1", "--set", "simulation.duration=2"], "--duration sets the same entry"),
         ("sweep", [*NEEDS["sweep"], "--set", "controller.gain=3"], "controller.gain = 3: has no effect"),
         ("sweep", [*NEEDS["sweep"], "--restart", "--retry-failed"], "--retry-failed: has no effect"),

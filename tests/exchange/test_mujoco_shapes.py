@@ -94,7 +94,7 @@ def test_the_shadow_hand_closes_on_a_bar_and_holds_it_when_it_is_turned_over():
 def test_the_shapes_of_a_tree_are_where_mujoco_has_them():
     """A small fixed sphere where each axis of a geom leaves it is as deep in that geom's shape as its radius."""
     model = MODELS["shadow"]()
-    data, description = mujoco.MjData(model), fp.from_mujoco(model)
+    data, description = mujoco.MjData(model), fp.from_mujoco(model, meshes="none")
     data.qpos[:] = np.random.default_rng(0).uniform(0.0, 0.3, model.nq)
     mujoco.mj_forward(model, data)
     shapes = {name: shape for body in description.tree.bodies.values() for name, shape in body.shapes.items()}
