@@ -1,0 +1,213 @@
+"""A finger over periods with inputs and forces held: its state after each, and the derivatives of that."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger_pin.core.addresses.law_code import ROW
+from finger_pin.core.jit import copied, pack
+from finger_pin.core.signals.bound_models import BoundModel
+from finger_pin.core.signals.compiled_finger import CompiledMechanism
+from finger_pin.core.stepping.island_stepper import IslandIntegrator, failure
+from finger_pin.core.stepping.period_derivatives import (
+    PERIOD_ARGS,
+    PeriodArgs,
+    advance_period,
+    fill_rows,
+    limit_bristles,
+)
+from finger_pin.core.stepping.stepper import TABLEAUS
+from finger_pin.core.steps import integration as core
+from finger_pin.core.tables.inputs import held_control
+from finger_pin.core.tables.islands import Island
+from finger_pin.core.tables.mechanism_parameters import Parameters, compile_mechanism
+from finger_pin.exceptions import InputError
+from finger_pin.laws.motor import MOTOR
+from finger_pin.mechanism.finger import Finger
+from finger_pin.typing import Array
+
+# Changes for differences: of the scale of a state, of an input in N or V, of a force in N.
+_STATE_CHANGE, _INPUT_CHANGE, _FORCE_CHANGE = 1e-6, 1e-4, 1e-4
+# Numbers of motors whose currents are given: what was measured has flowed, whatever the supply.
+_UNLIMITED, _UNHEEDED = dict.fromkeys(("voltage", "current_limit"), np.inf), ("dry", "by_torque", "by_load", "viscous")
+_CURRENT_DRIVE = {"by_current": 1.0, **_UNLIMITED, **dict.fromkeys(_UNHEEDED, 0.0)}
+_GAIN = MOTOR.parameters.index("gain")
+
+
+class PeriodMap:
+    """The map over periods of a finger with held inputs and forces, from a state on, with its derivatives.
+
+        periods = PeriodMap(Finger("ub_stand_in"), x)
+        periods.inputs[:] = tensions
+        periods.advance(1e-3)
+
+    Attributes:
+        finger: The finger.
+        x: Packed state, shape (n,); it may be changed in place to one near it, which forgets no step.
+        inputs: Held inputs, shape (u,), N, or of motors V in position drive or A; to be changed in place.
+        forces: At the tips, shape (t, 3), N, base frame; to be changed in place.
+        derivatives: Of the last period: of the state at its end by that at its start, inputs, forces and parameters,
+            shape (n, n + m) with m = u + 3 t + p.
+        address: Of what compiled code hands to the next two by `call_at`.
+        advance_address: Of the function that advances to a time and fills derivatives; it returns 0 when it is done.
+        limit_address: Of the function that limits bristles.
+    """
+
+    def __init__(
+        self,
+        finger: Finger,
+        x: Array,
+        varied: Sequence[tuple[Finger, float]] = (),
+        *,
+        currents: bool = False,
+        method: str = "Rodas4",
+        rtol: float = 1e-4,
+        atol_scale: float = 1e-4,
+    ) -> None:
+        """Start from a state at time zero.
+
+        Args:
+            finger: At rest as a whole, without free bodies.
+            x: Packed state, shape (n,).
+            varied: The finger with one parameter changed, and by how much, for each of p parameters.
+            currents: Whether inputs of motors are the currents that flow, A, in place of commands of their drives.
+            method: A compiled method.
+            rtol: Relative tolerance.
+            atol_scale: Absolute tolerance over the scale of each kind of state.
+
+        Raises:
+            InputError: If the base moves, a body is free, or a finger has another structure.
+        """
+        self.finger, mechanism = finger, finger.mechanism
+        structure, parameters = compile_mechanism(mechanism)
+        if mechanism.moved or len(structure.charts):
+            raise InputError("finger", "must be at rest as a whole, without free bodies", finger.description.name)
+        control = held_control(mechanism.channels, mechanism.coordinates)
+        laws, forces = [table.law for table in mechanism.rows], np.zeros((len(structure.tip_body), 3))
+        counts = mechanism.coordinates, len(structure.state), len(structure.state_row), mechanism.channels
+        places = [np.arange(count) for count in (*counts, 0, len(forces))]
+        whole = Island(*places)
+        tableau, memory = TABLEAUS[method](), np.zeros(len(core.StepMemory._fields))
+        # All models read the same inputs and forces.
+        loaded = bool(len(forces))
+        all_parameters = [self._fed(parameters, currents)._replace(tip_force=forces, has_tip_force=loaded)]
+        settings = np.zeros((0, 4)), tableau, float(rtol), atol_scale * finger.layout.scales(), memory
+        start = np.array(x, dtype=float)
+        self._integrator = IslandIntegrator(whole, laws, structure, all_parameters[0], control, start, *settings)
+        self.x, self.inputs, self.forces = start, control.tension, forces
+        for other, _ in varied:
+            same, parameters = compile_mechanism(other.mechanism)
+            if same is not structure:
+                raise InputError("varied", "must be the same finger with another number", other.description.name)
+            all_parameters.append(self._fed(parameters, currents)._replace(tip_force=forces, has_tip_force=loaded))
+        self._models = [BoundModel(structure, each, laws, control, linearised=False) for each in all_parameters]
+        self._evaluator, self._record = CompiledMechanism(mechanism), self._integrator.room(1)
+        args, unit = self._integrator.ready(self._record)
+        size, held = len(start), len(self.inputs) + forces.size + len(varied)
+        changes = [_INPUT_CHANGE] * len(self.inputs) + [_FORCE_CHANGE] * forces.size + [change for _, change in varied]
+        self.derivatives = np.zeros((size, size + held))
+        self._args = PeriodArgs(
+            advance=unit.address,
+            args=args,
+            plain=self._models[0].address,
+            varied=np.array([each.address for each in self._models[1:]], dtype=np.int64),
+            derivatives=self.derivatives,
+            held=np.zeros((size, held)),
+            inverse=np.zeros((size, size)),
+            terms=np.zeros((2 * size, size + held)),
+            weights=np.zeros(4),
+            right=np.zeros(size + 1),
+            steps=np.concatenate([_STATE_CHANGE * finger.layout.scales(), changes]),
+            rows=np.zeros((2, 1 + size + held, len(structure.state))),
+            bristles=self._bristles(),
+        )
+        self._block = pack(self._args, PERIOD_ARGS)
+        self.address = self._block.address
+        self.advance_address, self.limit_address = advance_period.address, limit_bristles.address
+        self.restart(start)
+
+    def _row_range(self, group: str) -> slice:
+        """Return the rows of a table among all; none where the finger lacks it."""
+        counts = {table.group: table.count for table in self.finger.mechanism.rows}
+        begin = sum(list(counts.values())[: [*counts, group].index(group)])
+        return slice(begin, begin + counts.get(group, 0))
+
+    def _fed(self, parameters: Parameters, currents: bool) -> Parameters:
+        """Return a copy of parameters, with motors that take currents as they are."""
+        numbers, motors = copied(parameters), self._row_range("motors")
+        for name, value in _CURRENT_DRIVE.items() if currents else ():
+            numbers.laws[MOTOR.parameters.index(name), motors] = value
+        if currents:
+            numbers.laws[_GAIN, motors] = numbers.laws[MOTOR.parameters.index("torque_constant"), motors]
+        return numbers
+
+    def _bristles(self) -> NDArray[np.int64]:
+        """Return places of bristles in the state, their rows, and columns of the rows' levels, shape (b, 3)."""
+        structure, entries, begin = self._integrator.structure, [], 0
+        for table in self.finger.mechanism.rows:
+            if "level" in table.law.signals and table.law.arms == 1:
+                column = ROW.signals + table.law.signals.index("level")
+                rows = np.arange(begin, begin + table.count)
+                places = 2 * self.finger.mechanism.coordinates + structure.state[rows]
+                entries += [(place, row, column) for place, row in zip(places, rows, strict=True)]
+            begin += table.count
+        return np.array(entries, dtype=np.int64).reshape(-1, 3)
+
+    @property
+    def time(self) -> float:
+        """Time reached, s."""
+        return self._integrator.time
+
+    @property
+    def steps(self) -> int:
+        """Number of steps that were tried so far."""
+        return int(self._integrator.memory.accepted_steps[0] + self._integrator.memory.rejected_steps[0])
+
+    def restart(self, x: Array, time: float | None = None) -> None:
+        """Continue from another state, at the same time or another one, s, with no memory of earlier steps."""
+        self._integrator.restart(np.array(x), np.zeros((0, 4)), time)
+
+    def advance(self, end: float) -> str:
+        """Advance to a time, s, and fill the derivatives; return in words what failed, or nothing."""
+        return self.failure(advance_period(self.address, end))
+
+    def failure(self, status: int) -> str:
+        """Return a status of `advance_period` in words; empty if nothing failed."""
+        return failure(self._integrator, status, list(self.finger.layout.names)) if status else ""
+
+    def limit_bristles(self) -> Array:
+        """Bring bristles of the state back to their levels, which steady sliding does not pass.
+
+        Returns:
+            These levels, shape (n,), N or N m; NaN for all other numbers of the state.
+        """
+        limit_bristles(self.address)
+        levels, (places, rows, columns) = np.full(len(self.x), np.nan), self._args.bristles.T
+        levels[places] = self._models[0].model.work.rows[columns, rows]
+        return levels
+
+    def watch(self, names: Sequence[str]) -> None:
+        """Prepare `watched` for signals that are sums of forces and inputs of rows with fixed weights, as tensions are.
+
+        Args:
+            names: Of `FingerSignals`.
+        """
+        count = self._args.rows.shape[-1]
+        # A row's force or input of 1 alone gives its weight.
+        buffer = self._evaluator.allocate(2 * count, "no_acceleration")
+        rows = np.zeros((len(buffer.rows), 2 * count, count))
+        rows[ROW.force, :count] = rows[ROW.command, count:] = np.eye(count)
+        x, inputs = np.tile(self.x, (2 * count, 1)), np.tile(self.inputs, (2 * count, 1))
+        evaluation = self._evaluator.to_evaluation(buffer._replace(rows=rows, packed=x))
+        signals = self.finger.signals(x, inputs, None, evaluation)
+        self._weights = np.concatenate([signals[name] for name in names], axis=-1).reshape(2, count, -1)
+
+    def watched(self) -> tuple[Array, Array]:
+        """Return the signals that are watched, shape (k,), and their derivatives, shape (k, n + m)."""
+        fill_rows(self.address)
+        rows, weights = self._args.rows, self._weights
+        values = rows[0] @ weights[0] + rows[1] @ weights[1]
+        return values[0], (values[1:] - values[0]).T / self._args.steps

@@ -1,0 +1,300 @@
+"""An observer: angles, tensions and contact forces from motor signals, with bands, one period after the other."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+import scipy.stats
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from finger_pin.core.jit import pack
+from finger_pin.core.stepping.period_map import PeriodMap
+from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
+from finger_pin.description.validation import suggestion
+from finger_pin.exceptions import InputError
+from finger_pin.mechanism.coerce import as_packed
+from finger_pin.mechanism.finger import Finger
+from finger_pin.observation.estimate import Band, Estimate
+from finger_pin.observation.filter import FILTER_ARGS, FilterArgs, correct, predict
+from finger_pin.observation.noise import assumed_forces, hidden_tension, period_noise, start_covariance
+from finger_pin.observation.record import Record
+from finger_pin.observation.sensors import Sensors
+from finger_pin.observation.touch import TouchMonitor
+from finger_pin.observation.uncertainty import Uncertainty
+from finger_pin.simulation.simulator import Simulator
+from finger_pin.typing import Array
+
+# After so many periods without a reading that fits the estimate is off by as much, of the scale of each number.
+_MAX_MISSED, _LOST = 50, 0.1
+# What an input that is missing has changed by, as a part of the last one.
+_MISSING_INPUT = 1.0
+
+
+class Observer:
+    """What a finger does, from readings of its sensors, with bands, one period after the other.
+
+        observer = fp.observe("wound")
+        observer.start(motor_position={"servo": 0.0})
+        while True:
+            now = observer.step({"motor_position.servo": angle, "motor_current.servo": current})
+
+    Attributes:
+        finger: The finger of the model, without surroundings: what it touches is to be found.
+        uncertainty: Numbers of the model that are not known exactly.
+        sensors: What may be read.
+        period: s.
+        level: Of the bands.
+    """
+
+    def __init__(
+        self,
+        scenario: ScenarioLike,
+        *,
+        uncertain: Mapping[str, float] | xr.Dataset | None = None,
+        sensors: Mapping[str, Mapping[str, float]] | None = None,
+        forces: Iterable[str] | Mapping[str, float] = ("fingertip",),
+        period: float = 1e-3,
+        level: float = 0.95,
+    ) -> None:
+        """Make a model of a scenario's finger, and start at rest where the scenario does; see `observe`."""
+        loaded = load_scenario(scenario)
+        if not 0.0 < period <= 0.1:
+            raise InputError("period", "must be above 0 and at most 0.1 s", period)
+        if not 0.0 < level < 1.0:
+            raise InputError("level", "must be above 0 and below 1", level)
+        # What surrounds the finger is not known to it.
+        loaded = loaded.updated(environment={"objects": {}})
+        self.scenario, self.finger, self.period, self.level = loaded, Finger(loaded.finger), float(period), float(level)
+        finger = self.finger
+        self.uncertainty = Uncertainty.from_scenario(loaded, finger, uncertain)
+        self._rest = Simulator.from_scenario(loaded, finger=finger).x
+        self._periods = PeriodMap(finger, self._rest, self.uncertainty.varied, currents=True)
+        self._tips = finger.description.tree.tip_names or ("",)
+        self._force_at, self._force_deviation = assumed_forces(self._tips, forces)
+        self._force_names = [self._tips[k // 3] for k in self._force_at[::3]]
+        names = [f"fingertip_force.{self._tips[k // 3]}.{'xyz'[k % 3]}".replace("..", ".") for k in self._force_at]
+        self.sensors = Sensors.from_finger(finger, names, sensors)
+        self._quantile = float(scipy.stats.norm.ppf(0.5 + 0.5 * level))
+        # Of both signals that are watched.
+        self._hidden = np.tile(self._quantile * hidden_tension(finger, self.sensors), 2)
+        self._periods.watch(("tendon_tension", "spool_tension"))
+        self._known = np.where(self.uncertainty.deviations > 0.0, self.uncertainty.deviations, 1.0)
+        size, held = len(self._periods.x), self._periods.derivatives.shape[1]
+        self._columns = np.r_[
+            np.arange(size), size + len(self._periods.inputs) + self._force_at, held - len(self.uncertainty.keys) : held
+        ]
+        self._covariance = np.zeros((len(self._columns), len(self._columns)))
+        self._bind((), self.period)
+        self.start()
+
+    def _bind(self, read: tuple[str, ...], h: float) -> None:
+        """Bind the filter to the sensors that are read, and to a period, s."""
+        periods, finger = self._periods, self.finger
+        size, forces, inputs = len(periods.x), len(self._force_at), len(periods.inputs)
+        wide = size + forces + len(self.uncertainty.keys)
+        noise, decay = period_noise(finger, self._force_deviation, h)
+        self._filter = FilterArgs(
+            advance=periods.advance_address,
+            limit=periods.limit_address,
+            period=periods.address,
+            state=periods.x,
+            forces=periods.forces,
+            derivatives=periods.derivatives,
+            covariance=self._covariance,
+            map=np.zeros((size, wide)),
+            product=np.zeros((size, wide)),
+            force_at=self._force_at,
+            decay=decay,
+            noise=noise,
+            input_variance=np.zeros(inputs),
+            places=self.sensors.places(read),
+            readings=np.full(len(read), np.nan),
+            variance=np.array([self.sensors.deviation[name] for name in read], dtype=float) ** 2,
+            innovations=np.zeros(len(read)),
+            gain=np.zeros(wide),
+        )
+        self._block, self._bound = pack(self._filter, FILTER_ARGS), (read, h)
+
+    def start(
+        self,
+        motor_position: Mapping[str, float] | None = None,
+        position: ArrayLike | None = None,
+        *,
+        state: ArrayLike | None = None,
+        covariance: ArrayLike | None = None,
+    ) -> None:
+        """Start at rest at time zero, with a new record.
+
+        Args:
+            motor_position: By motor theta_m, rad; others wind their tendons just taut.
+            position: theta, shape (n,), rad; by default where the scenario's finger starts.
+            state: Packed state, shape (size,), in place of both.
+            covariance: Of the state, shape (size, size); by default 0.01 rad, and bristles of half their levels.
+
+        Raises:
+            InputError: Naming the argument that is wrong.
+        """
+        finger, periods = self.finger, self._periods
+        size = len(periods.x)
+        if state is None:
+            x = self._rest.copy() if position is None else finger.rest_state(np.asarray(position, dtype=float))
+            motors = finger.layout.unpack(x).motor_position
+            for name, angle in (motor_position or {}).items():
+                if name not in finger.actuators.names:
+                    raise InputError(
+                        f"motor_position.{name}", f"no such motor{suggestion(name, finger.actuators.names)}"
+                    )
+                motors[finger.actuators.names.index(name)] = angle
+        else:
+            x = as_packed(finger, state, "state")
+        periods.restart(x)
+        periods.inputs[:] = periods.forces[:] = 0.0
+        levels = periods.limit_bristles()
+        p = self._covariance
+        p[:] = 0.0
+        p[:size, :size] = start_covariance(finger, self.sensors, levels) if covariance is None else covariance
+        at = np.arange(size, len(p))
+        p[at, at] = np.concatenate([self._force_deviation, self.uncertainty.deviations]) ** 2
+        self._begin, self._last, self._missed = periods.time, dict[str, float](), 0
+        self._touch, self._record = TouchMonitor(len(self._force_at) // 3), Record(self.finger, self._force_names)
+
+    def step(self, readings: Mapping[str, float], period: float | None = None) -> Estimate:
+        """Go on by a period, and correct what is known by the readings at its end.
+
+        Args:
+            readings: By name, in SI: every input, ``motor_current.M1``, A, or ``tensions.T1``, N, and what sensors
+                read, ``motor_position.M1``, rad. NaN is a reading that is missing.
+            period: s; by default that of the observer.
+
+        Raises:
+            InputError: If a name is none, or an input is left out.
+        """
+        begin, whole = time.perf_counter(), self.period if period is None else float(period)
+        if not 0.0 < whole < np.inf:
+            raise InputError("period", "must be above 0 s", period)
+        read = tuple(name for name in readings if name in self.sensors.states)
+        if len(read) + len(self.sensors.inputs) != len(readings) or not self.sensors.inputs.keys() <= readings.keys():
+            self.sensors.check(readings)
+        # Over a gap the model goes on by itself.
+        pieces = max(1, round(whole / self.period))
+        h = whole / pieces
+        if self._bound != (read, h):
+            self._bind(read, h)
+        skipped, failure = self._hold(readings), ""
+        for _ in range(pieces):
+            failure = self._predict(h) or failure
+        self._filter.readings[:] = [readings[name] for name in read]
+        taken = correct(self._block.address)
+        innovations = self._filter.innovations.tolist()
+        if taken < len(read):
+            skipped += [name for name, each in zip(read, innovations, strict=True) if each != each]
+        self._count_missed(taken, len(read))
+        of_forces = slice(len(self._periods.x), len(self._periods.x) + len(self._force_at))
+        self._touch.follow(innovations, self._force, self._covariance[of_forces, of_forces], self.time, whole)
+        estimate = self._estimate(tuple(skipped), failure)
+        self._record.add(estimate, time.perf_counter() - begin)
+        return estimate
+
+    def _hold(self, readings: Mapping[str, float]) -> list[str]:
+        """Hold the mean of the last two readings of every input over a period; return those that are missing."""
+        inputs, variance, missing = self._periods.inputs, self._filter.input_variance, []
+        for name, channel in self.sensors.inputs.items():
+            value, deviation = float(readings[name]), float(self.sensors.input_deviation[channel])
+            last = self._last.get(name, value)
+            if not np.isfinite(value):
+                # It was something like the last one.
+                missing.append(name)
+                value, last = (last, last + _MISSING_INPUT * abs(last)) if np.isfinite(last) else (0.0, 0.0)
+            inputs[channel] = 0.5 * (value + last)
+            # Between two readings it was anything between them.
+            variance[channel] = deviation**2 + (value - last) ** 2 / 12.0
+            self._last[name] = value
+        return missing
+
+    def _predict(self, h: float) -> str:
+        """Predict over a period, s, or go on from the last estimate where that fails; return why it did."""
+        periods, end = self._periods, self._periods.time + h
+        x, force = periods.x.copy(), periods.forces.copy()
+        if not (status := predict(self._block.address, end)):
+            return ""
+        failure = periods.failure(status)
+        periods.restart(x)
+        periods.forces[:] = force
+        if predict(self._block.address, end):
+            # The estimate stays as it was, and is less certain.
+            periods.restart(x, end)
+            periods.forces[:] = force
+            at = np.arange(len(x))
+            self._covariance[at, at] += self._filter.noise[: len(x)]
+        return failure
+
+    def _count_missed(self, taken: int, read: int) -> None:
+        """Count periods without a reading that fits: what is read so often is so, and the estimate is lost."""
+        self._missed = 0 if taken or not read else self._missed + 1
+        if self._missed > _MAX_MISSED:
+            at, self._missed = np.arange(len(self._periods.x)), 0
+            self._covariance[at, at] += _LOST**2 * self.finger.layout.scales() ** 2
+
+    def result(self) -> xr.Dataset:
+        """Return the Dataset of all steps since the start: estimates and bands over time.
+
+        Of every band the value has the name of a run's variable, and its ends ``_low`` and ``_high`` behind it.
+
+        Raises:
+            InputError: If nothing has been observed.
+        """
+        attributes = {
+            "scenario": self.scenario.name,
+            "scenario_toml": to_toml(self.scenario),
+            "finger": self.finger.description.name,
+            "level": self.level,
+            "period": self.period,
+            "uncertain": list(self.uncertainty.keys),
+        }
+        return self._record.dataset(attributes)
+
+    @property
+    def _force(self) -> Array:
+        """The forces that are estimated, shape (f, 3), N."""
+        return self._periods.forces.ravel()[self._force_at].reshape(-1, 3)
+
+    @property
+    def time(self) -> float:
+        """Time from the start, s."""
+        return self._periods.time - self._begin
+
+    def _estimate(self, skipped: tuple[str, ...], failure: str) -> Estimate:
+        """Return the present estimate."""
+        periods, p, quantile = self._periods, self._covariance, self._quantile
+        size, joints, forces = len(periods.x), len(self.finger.routing.joints), len(self._force_at)
+        variance = np.maximum(p.diagonal(), 0.0)
+        # Of the angles, what follows from numbers that readings do not correct.
+        considered = ((p[:joints, size + forces :] / self._known) ** 2).sum(axis=1) / variance[:joints]
+        force_variance = variance[size : size + forces]
+        tension, slopes = periods.watched()
+        slopes = slopes[:, self._columns]
+        half = np.maximum(
+            quantile * np.sqrt(np.maximum(((slopes @ p) * slopes).sum(axis=1), 0.0)), self._hidden - tension
+        )
+        cords = len(tension) // 2
+        return Estimate(
+            time=self.time,
+            joint_position=Band.around(periods.x[:joints].copy(), quantile * np.sqrt(variance[:joints])),
+            tendon_tension=Band.around(tension[:cords], half[:cords], 0.0),
+            spool_tension=Band.around(tension[cords:], half[cords:], 0.0),
+            fingertip_force=Band.around(
+                periods.forces.ravel()[self._force_at].reshape(-1, 3), quantile * np.sqrt(force_variance).reshape(-1, 3)
+            ),
+            touched=self._touch.touched,
+            since=self._touch.since.copy(),
+            consistency=self._touch.consistency,
+            observable={
+                "joint_position": np.clip(1.0 - considered, 0.0, 1.0),
+                "fingertip_force": np.clip(1.0 - force_variance / self._force_deviation**2, 0.0, 1.0).reshape(-1, 3),
+            },
+            skipped=skipped,
+            failure=failure,
+        )

@@ -1,0 +1,58 @@
+"""Whether something presses on tips, and whether a model fits its readings, over the periods of an observer."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.stats
+from numpy.typing import NDArray
+
+from finger_pin.typing import Array
+
+# F^T P^-1 F from which a force presses, and below which none does any more: what its noise alone passes once in a
+# thousand and in ten times; and how long it must be beyond, s.
+_TOUCH, _LET_GO = (float(scipy.stats.chi2.ppf(level, 3)) for level in (0.999, 0.9))
+_TOUCH_TIME = 0.01
+# Time over which innovations are averaged, s.
+_CONSISTENCY_TIME = 0.2
+
+
+class TouchMonitor:
+    """Touches of some tips, and the consistency of innovations.
+
+    Attributes:
+        since: When a force began to press on each tip, shape (f,), s; NaN where none does.
+        consistency: Mean square of the last innovations over their standard deviations.
+    """
+
+    def __init__(self, tips: int) -> None:
+        """Start where nothing touches."""
+        self.since, self._beyond_since, self.consistency = np.full(tips, np.nan), np.full(tips, np.nan), 1.0
+
+    @property
+    def touched(self) -> NDArray[np.bool_]:
+        """Whether a force presses on each tip, shape (f,)."""
+        touched: NDArray[np.bool_] = self.since == self.since
+        return touched
+
+    def follow(self, innovations: list[float], force: Array, covariance: Array, time: float, h: float) -> None:
+        """Go on by a period, s, to a time, s.
+
+        Args:
+            innovations: Over their standard deviations, NaN for readings that were not taken.
+            force: Estimates, shape (f, 3), N.
+            covariance: Of the estimates, shape (3 f, 3 f).
+            time: s.
+            h: s.
+        """
+        squares = [each * each for each in innovations if each == each]
+        if squares:
+            self.consistency += min(1.0, h / _CONSISTENCY_TIME) * (sum(squares) / len(squares) - self.consistency)
+        for k, vector in enumerate(force):
+            part = slice(3 * k, 3 * k + 3)
+            distance = float(vector @ np.linalg.solve(covariance[part, part], vector))
+            if distance < (_LET_GO if self.since[k] == self.since[k] else _TOUCH):
+                self.since[k] = self._beyond_since[k] = np.nan
+            elif self._beyond_since[k] != self._beyond_since[k]:
+                self._beyond_since[k] = time
+            elif time - self._beyond_since[k] >= _TOUCH_TIME:
+                self.since[k] = self._beyond_since[k]
