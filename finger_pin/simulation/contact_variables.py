@@ -69,15 +69,16 @@ def last_contact_state(finger: Finger, last: xr.Dataset) -> dict[str, Array]:
 def without_far_pairs(result: xr.Dataset) -> xr.Dataset:
     """Return a result without the pairs of contacts that never came near; the attribute `OMITTED_PAIRS` counts them.
 
-    Near is a millimetre, and twice what a gap changes by between samples, as pairs may touch between these.
+    Near is a millimetre, and twice what a gap changes by to the samples beside, as pairs may touch between these. What
+    is left is a copy, which keeps no memory of the others.
     """
-    if not {"contact_gap", "contact_bend"} <= {*result.data_vars} or not result.sizes["time"]:
+    if "contact_gap" not in result or not result.sizes["time"]:
         return result
-    gap = result["contact_gap"].transpose("time", "contact").values
+    gap = result["contact_gap"].values
+    change = np.zeros((len(gap) + 1, *gap.shape[1:]))
     bent = (result["contact_bend"] != 0.0).any(("time", "tangent")).values
     with np.errstate(invalid="ignore"):
-        change = np.max(np.abs(np.diff(gap, axis=0)), axis=0, initial=0.0)
-        far = (gap.min(axis=0) > _FAR_GAP + 2.0 * change) & ~bent
-    if not far.any():
-        return result
-    return result.isel(contact=~far).assign_attrs({OMITTED_PAIRS: int(result.attrs.get(OMITTED_PAIRS, 0) + far.sum())})
+        change[1:-1] = np.abs(np.diff(gap, axis=0))
+        far = np.all(gap > _FAR_GAP + 2.0 * np.maximum(change[:-1], change[1:]), axis=0) & ~bent
+    omitted = {OMITTED_PAIRS: int(far.sum())} if far.any() else {}
+    return result.isel(contact=~far).assign_attrs(omitted)

@@ -45,11 +45,15 @@ def record_arrays(samples: SampledTrajectory, names: Sequence[str] | None = None
         del table[SHORTFALL]
     recorded = table if names is None else {name: table[name] for name in names}
     # Energies of a diverging motion may overflow; the motion itself is checked elsewhere.
-    # A few variables are copied, so that the arrays they are views of are freed.
-    convert = np.asarray if names is None else np.array
+    # Copies, so that the arrays that they are views of are freed; `without_far_pairs` copies those of contacts.
+    views = {name for name, each in recorded.items() if names is None and "contact" in each.dims}
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         return {
-            name: (("time", *each.dims), convert(samples.values_of(each)), each.attributes)
+            name: (
+                ("time", *each.dims),
+                (np.asarray if name in views else np.array)(samples.values_of(each)),
+                each.attributes,
+            )
             for name, each in recorded.items()
         }
 

@@ -42,6 +42,7 @@ from finger_pin.simulation.accuracy import (
     ringing_warning,
     stiffness_warning,
 )
+from finger_pin.simulation.contact_variables import without_far_pairs
 from finger_pin.simulation.initial_state import custom_parts, with_initial_state
 from finger_pin.simulation.recording import RunArrays, check_memory, check_variables, finite_part, record, select
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
@@ -104,6 +105,7 @@ def run(
     ringing_message = ringing_warning(loop, trajectory)
     stiffness_message = stiffness_warning(result, loop.finger, scenario.simulation.atol_scale)
     _warn(stiffness_message, AccuracyWarning)
+    result = without_far_pairs(result)
     if locking_margin is not None:
         result.attrs["self_locking_margin"] = locking_margin
     account_message = "" if trajectory.failure else account_warning(result, residual_share(result))
@@ -131,11 +133,15 @@ def _warn(message: str, category: type[Warning]) -> None:
 
 
 def _accuracy_variables(loop: ClosedLoop, names: Sequence[str]) -> list[str]:
-    """Return the variables that the warnings about accuracy need: the energy account, and the gaps of contacts."""
+    """Return the variables that judge a run: the energy account, and by which contacts are near."""
     table = variables(loop)
     check_variables("variables", names, table)
     energies = [name for name, quantity in table.items() if quantity.energy_term is not None and quantity.units == "J"]
-    return [name for name in (*energies, "energy_residual", "contact_gap") if name in table and name not in names]
+    return [
+        name
+        for name in (*energies, "energy_residual", "contact_gap", "contact_bend")
+        if name in table and name not in names
+    ]
 
 
 def _raise_if_incomplete(setup: Setup, trajectory: Trajectory, result: xr.Dataset, ringing_message: str) -> xr.Dataset:

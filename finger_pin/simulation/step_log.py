@@ -26,6 +26,7 @@ from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.references.reference import LoopReference, Reference, SignalReference
 from finger_pin.references.signal import Signal
 from finger_pin.simulation.accuracy import account_warning, residual_share
+from finger_pin.simulation.contact_variables import without_far_pairs
 from finger_pin.simulation.recording import check_memory, record
 from finger_pin.simulation.sampled_trajectory import SampledTrajectory
 from finger_pin.typing import Array
@@ -121,7 +122,7 @@ class StepLog:
         times = knots[0] + scenario.sample_times()
         nearest_knot = knots[np.clip(np.searchsorted(knots, times - _SAME_TIME), 0, len(knots) - 1)]
         times = np.where(np.abs(nearest_knot - times) < _SAME_TIME, nearest_knot, times)
-        result = record(scenario, SampledTrajectory(loop, trajectory, times), settings.method)
+        result = without_far_pairs(record(scenario, SampledTrajectory(loop, trajectory, times), settings.method))
         result.attrs["custom"] = "loop"
         if trajectory.failure:
             end = float(trajectory.breakpoints[-1])

@@ -53,7 +53,8 @@ def simulate_many(
     Returns:
         The variables of `simulate` with a leading dimension ``run``. A run that could not be finished is NaN after
         its end; ``failure`` says why. A variable of only some runs, such as of motors, is NaN in the others, and its
-        attribute ``comment`` names them. ``scenario`` holds every run's TOML.
+        attribute ``comment`` names them; so are contacts in runs that leave them out, but for ``variables`` that are
+        named. ``scenario`` holds every run's TOML.
 
     Raises:
         InputError: If there are no scenarios, they cannot be stacked, or a variable does not exist.

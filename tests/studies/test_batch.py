@@ -60,7 +60,7 @@ def test_runs_that_all_fail_are_an_error_that_holds_what_was_computed(monkeypatc
 def test_what_only_some_runs_have_is_nan_in_the_others_and_said() -> None:
     names = ("reversals", "servo", "press")
     runs = [fp.load_scenario(name, {"simulation.duration": 5e-3, "simulation.sample_rate": 1e3}) for name in names]
-    ball = {"ball": {"shape": "sphere", "radius": 0.01, "mass": 0.01, "position": [0.0, 0.2, 0.0]}}
+    ball = {"ball": {"shape": "sphere", "radius": 0.01, "mass": 0.01, "position": [0.0, 0.2, 0.0395]}}
     more = runs[2].model_dump(exclude_none=True)
     more["environment"]["objects"] |= ball
     more["controller"] = {"kind": "tensions", "minimum_tension": 2.0}

@@ -14,6 +14,7 @@ from finger_pin.core.steps.error_norm import step_error
 from finger_pin.core.steps.integration import INTEGRATION, Integration
 from finger_pin.core.steps.interpolation import cut_to_share, interpolate_share
 from finger_pin.core.steps.tableaus import Tableau
+from finger_pin.core.tables.buffers import Work
 from finger_pin.core.tables.model import MODEL, Model
 from finger_pin.core.tables.structure import Structure
 
@@ -62,19 +63,34 @@ def freeze(address: int, _time: float) -> int:
 
 
 @njit_inline
-def leaving_share(structure: Structure, rows: Matrix, kinks: Vector) -> float:
+def _leaving_share(rows: Matrix, kinks: Vector, column: int, begin: int, end: int) -> float:
+    """Return the earliest share of a step at which one of some rows leaves its branch, infinity for none."""
+    share = np.inf
+    for k in range(begin, end):
+        nearer = kinks[k] - rows[column, k]
+        if kinks[k] * nearer > 0.0:
+            share = min(share, kinks[k] / nearer)
+    return share
+
+
+@njit_inline
+def leaving_share(structure: Structure, work: Work, kinks: Vector) -> float:
     """Return the earliest share of a step at which a frozen row leaves its branch, above 1 if none has.
 
-    It is taken to go on at its mean rate.
+    It is taken to go on at its mean rate. Contacts that are culled stay on theirs.
     """
-    share = np.inf
+    share, pieces = np.inf, work.paths
     for g in range(structure.groups.first.size):
-        column = structure.groups.kink[g]
-        if column > ROW.speed:
-            for k in range(structure.groups.first[g], structure.groups.end[g]):
-                nearer = kinks[k] - rows[column, k]
-                if kinks[k] * nearer > 0.0:
-                    share = min(share, kinks[k] / nearer)
+        column, begin, end = structure.groups.kink[g], structure.groups.first[g], structure.groups.end[g]
+        if column <= ROW.speed:
+            continue
+        if begin >= structure.contact_rows:
+            share = min(share, _leaving_share(work.rows, kinks, column, begin, end))
+            continue
+        for index in range(pieces.active_pair_count[0]):
+            k = structure.paths.row[pieces.active_pairs[index]]
+            if begin <= k < end:
+                share = min(share, _leaving_share(work.rows, kinks, column, k, k + structure.contact_arms))
     return share
 
 
@@ -83,13 +99,13 @@ def left(address: int, _time: float) -> int:
     """Return 1 if a frozen row of an `Integration`'s model has left its branch, else 0."""
     integration = unpack(address, INTEGRATION)
     model = unpack(integration.model, MODEL)
-    return 1 if left_share(model.structure, model.work.rows, integration.kinks) < 1.0 else 0
+    return 1 if left_share(model.structure, model.work, integration.kinks) < 1.0 else 0
 
 
 @njit_inline
-def left_share(structure: Structure, rows: Matrix, kinks: Vector) -> float:
+def left_share(structure: Structure, work: Work, kinks: Vector) -> float:
     """Return the least share of the step after which a frozen row has left its branch, 1 if none has."""
-    return min(1.0, leaving_share(structure, rows, kinks))
+    return min(1.0, leaving_share(structure, work, kinks))
 
 
 @njit_inline
@@ -144,7 +160,7 @@ def midpoint_violation(integration: Integration, model: Model, time: float, h: f
     copy(state, end)
     interpolate_share(x, end, integration.dense, 0.5, state)
     call_at(model.evaluate, integration.model, time + 0.5 * h)
-    share = left_share(model.structure, model.work.rows, integration.kinks)
+    share = left_share(model.structure, model.work, integration.kinks)
     if share < 1.0 and branch_error(integration, model, time + 0.5 * h, h) <= 1.0:
         share = 1.0
     copy(end, state)
@@ -178,7 +194,7 @@ def locate_event(
         interpolate_share(x, end, integration.dense, at, state)
         call_at(model.evaluate, integration.model, time + at * h)
         count += 1
-        share = leaving_share(model.structure, model.work.rows, integration.kinks)
+        share = leaving_share(model.structure, model.work, integration.kinks)
         if share < 1.0:
             count += 2
             cost = branch_error(integration, model, time + at * h, at * h)

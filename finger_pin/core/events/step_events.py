@@ -106,7 +106,7 @@ def _accepted_shares(integration: Integration, model: Model, h: float, outcome: 
         after which a row has left its side, or 1.
     """
     memory, time = integration.memory, integration.memory.time[0]
-    share, dear, part = left_share(model.structure, model.work.rows, integration.kinks), False, 1.0
+    share, dear, part = left_share(model.structure, model.work, integration.kinks), False, 1.0
     # Of a step as short as this nothing can be cut, but the next one must still not be too long.
     long = h > _MIN_CUT_STEP * max(1.0, abs(time))
     if share < 1.0:

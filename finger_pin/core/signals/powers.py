@@ -9,6 +9,7 @@ from finger_pin.core.evaluation.attitude_charts import place_bodies
 from finger_pin.core.evaluation.input_values import inputs
 from finger_pin.core.jit import (
     CompiledFunction,
+    Indices,
     Matrix,
     StructType,
     Vector,
@@ -30,13 +31,15 @@ class Powers(NamedTuple):
 
     Attributes:
         model: Address of a bound `Model` with the island's inputs.
-        steps: The steps, of which there must be one.
+        steps: The steps, of which there must be one, with room for one state.
+        columns: Of the state's numbers those that the steps have, the others are zero, shape (size of the steps,).
         energy_terms: Scratch, energies and powers of the rows, shape (energies,).
         powers: Filled with the powers, and that of the forces at the tips, shape (k, powers + 1).
     """
 
     model: int
     steps: Interpolation
+    columns: Indices
     energy_terms: Vector
     powers: Matrix
 
@@ -73,10 +76,14 @@ def power_many(address: int, _time: float) -> int:
     width, step, last = work.torque.size, -1, -1
     moving = model.base_power != 0 or work.guide.size > 0
     activate_all_pairs(structure, work)
+    for c in range(state.size):
+        state[c] = 0.0
     for k in range(steps.times.size):
         time, last = steps.times[k], step
         step = step_at(steps, time, step)
-        interpolate_within(steps, step, time, state)
+        interpolate_within(steps, step, time, steps.interpolated[0])
+        for c in range(powers.columns.size):
+            state[powers.columns[c]] = steps.interpolated[0, c]
         if step != last:
             place_bodies(structure, parameters, _attitude(steps, step))
         if moving:

@@ -13,6 +13,7 @@ import numpy as np
 from finger_pin.cancellation import Stop
 from finger_pin.core.stepping.island_motion import IslandMotion
 from finger_pin.core.stepping.island_stepper import IslandIntegrator, failure
+from finger_pin.core.stepping.packed_steps import PackedSteps
 from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.core.steps import integration as core
 from finger_pin.core.steps.repetition import Steps
@@ -25,6 +26,8 @@ from finger_pin.typing import Array
 _MOST_BYTES = 2e9
 # Room for so many of an island's to begin with; what is not used of it takes no memory.
 _FIRST_RECORD_LENGTH = 8192
+# Steps with contacts that are packed at once.
+_PACKED_LENGTH = 256
 
 # After so long, s, a run is slow that has at least as long before it and has simulated less than this part of it.
 _PATIENCE, _SLOW_SHARE = 10.0, 0.1
@@ -58,9 +61,10 @@ class _Recorder:
         self._stepper, self._index = stepper, index
         part = self.part
         self.start = (part.time, part.x.copy(), part.attitude.copy())
-        self.room, self._chunk = part.room(_FIRST_RECORD_LENGTH), chunk
-        self.step_count = 0
-        self.most = int(_MOST_BYTES / (8 * len(part.x) * (1 + len(part.tableau.dense))))
+        # Of what touches nothing all is kept where it is recorded.
+        self._packed = PackedSteps(part.structure, part.x) if part.structure.contact_rows else None
+        self.room, self._chunk = part.room(_FIRST_RECORD_LENGTH if self._packed is None else _PACKED_LENGTH), chunk
+        self.step_count = self._used = 0
         # Compiling is no part of an integration's cost.
         part.ready(self.room)[1].compile()
 
@@ -68,14 +72,28 @@ class _Recorder:
         """Go to a time, or until some chunks are full; return the status."""
         part = self.part
         while chunks != 0:
-            if self.step_count == len(self.room.times):
-                self.room = self.room.doubled()
-            rows = slice(self.step_count, self.step_count + self._chunk)
-            status, self.step_count = part.advance(end, self.room, rows)
+            if self._used == len(self.room.times):
+                self._make_room()
+            before = self._used
+            status, self._used = part.advance(end, self.room, slice(before, before + self._chunk))
+            self.step_count += self._used - before
             chunks -= 1
-            if status != core.FULL or self.step_count >= self.most:
+            if status != core.FULL or self.is_full:
                 return status
         return core.DONE
+
+    def _make_room(self) -> None:
+        if self._packed is None:
+            self.room = self.room.doubled()
+        else:
+            self._packed.add(self.room)
+            self._used = 0
+
+    @property
+    def is_full(self) -> bool:
+        """Whether the steps take all the memory that is for them."""
+        size = len(self.part.x) if self._packed is None else int(np.count_nonzero(self._packed.stored))
+        return 8 * size * (1 + len(self.part.tableau.dense)) * self.step_count >= _MOST_BYTES
 
     @property
     def part(self) -> IslandIntegrator:
@@ -86,7 +104,7 @@ class _Recorder:
         """Return why a status ends the integration, empty if it does not; ``names`` are those of the state."""
         if status > core.FULL:
             return failure(self.part, status, [names[at] for at in self._stepper.places(self.part.island)])
-        if self.step_count >= self.most and self.part.time < duration:
+        if self.is_full and self.part.time < duration:
             return f"after {self.step_count} steps the trajectory has reached the most that is kept in memory"
         return ""
 
@@ -96,7 +114,11 @@ class _Recorder:
 
     def steps(self) -> IslandMotion:
         """Return the steps that were taken."""
-        return IslandMotion(self._stepper.mechanism, self.part, *self.start, self.room.first(self.step_count))
+        record, columns = self.room.first(self._used), np.arange(len(self.part.x))
+        if self._packed is not None:
+            self._packed.add(record)
+            record, columns = self._packed.joined(), np.flatnonzero(self._packed.stored)
+        return IslandMotion(self._stepper.mechanism, self.part, *self.start, record, columns)
 
 
 def integrate_compiled(

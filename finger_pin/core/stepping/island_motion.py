@@ -15,7 +15,7 @@ from finger_pin.core.steps.interpolation import INTERPOLATION, Interpolation, in
 from finger_pin.description.caching import cached_property
 from finger_pin.mechanism.mechanism import Mechanism
 from finger_pin.threads import in_threads, threads
-from finger_pin.typing import Array
+from finger_pin.typing import Array, Indices
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +29,7 @@ class IslandMotion:
         start: State then.
         attitude: Quaternions of its free bodies then.
         record: The steps.
+        columns: Of the state's numbers those that the record has, in order, shape (k,); all others are zero throughout.
     """
 
     mechanism: Mechanism
@@ -37,6 +38,7 @@ class IslandMotion:
     start: Array
     attitude: Array
     record: Record
+    columns: Indices
 
     @property
     def times(self) -> Array:
@@ -50,15 +52,20 @@ class IslandMotion:
         if len(self.record.times):
             call(interpolate_many, steps, INTERPOLATION)
         else:
-            steps.interpolated[:], steps.turned[:] = self.start, self.attitude
-        return steps.interpolated, steps.turned
+            steps.interpolated[:], steps.turned[:] = steps.start, self.attitude
+        if len(steps.start) == len(self.start):
+            return steps.interpolated, steps.turned
+        states = np.zeros((len(at), len(self.start)))
+        states[:, self.columns] = steps.interpolated
+        return states, steps.turned
 
     def _steps_at(self, times: Array, count: int = 0) -> Interpolation:
         """Return the steps and times with a buffer for m states."""
         record, structure = self.record, self.part.structure
+        start = self.start[self.columns]
         return Interpolation(
             begin=self.begin,
-            start=self.start,
+            start=start,
             attitude=self.attitude,
             ends=record.times,
             states=record.states,
@@ -66,9 +73,9 @@ class IslandMotion:
             dense=record.dense,
             charts=structure.charts,
             width=len(structure.prescribed),
-            before=np.zeros_like(self.start),
+            before=np.zeros_like(start),
             times=times,
-            interpolated=np.empty((count, len(self.start))),
+            interpolated=np.empty((count, len(start))),
             turned=np.empty((count, *self.attitude.shape)),
         )
 
@@ -88,9 +95,9 @@ class IslandMotion:
 
         def fill(thread: int) -> None:
             part = slice(thread * count // parts, (thread + 1) * count // parts)
-            steps = self._steps_at(np.array(times[part]))
+            steps, columns = self._steps_at(np.array(times[part]), 1), self.columns
             energy_terms = np.zeros(len(energies.stored) + len(energies.powers))
-            call(power_many, Powers(self._models[thread].address, steps, energy_terms, powers[part]), POWERS)
+            call(power_many, Powers(self._models[thread].address, steps, columns, energy_terms, powers[part]), POWERS)
 
         in_threads(fill, range(parts))
         return powers

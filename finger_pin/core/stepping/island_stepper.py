@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.core.evaluation.attitude_charts import place_all
 from finger_pin.core.events.step_events import activate_contacts, step_events
@@ -39,7 +40,8 @@ class Record:
         attitudes: Quaternions after that, shape (m, f, 4).
         dense: Coefficients of the steps' interpolants, shape (m, rows, size).
         shares: Of the lengths that were tried the shares that were taken, shape (m,).
-        branches: Where the rows were between the sides of their kinks at the start of each, shape (m, K).
+        branches: Where the rows were between the sides of their kinks at the start of each, or, of `PackedSteps`, the
+            signs of that, shape (m, K).
     """
 
     times: Array
@@ -47,7 +49,7 @@ class Record:
     attitudes: Array
     dense: Array
     shares: Array
-    branches: Array
+    branches: NDArray[Any]
 
     @classmethod
     def from_sizes(cls, count: int, size: int, free: int, rows: int, kinks: int) -> Record:
@@ -254,9 +256,10 @@ class IslandIntegrator:
 
     def repeat(self, steps: Steps) -> None:
         """Repeat given steps from now on, regardless of errors."""
-        known = steps.branches.shape[1] == len(self._bound.kinks)
+        branches = np.asarray(steps.branches, dtype=float)
+        known = branches.shape[1] == len(self._bound.kinks)
         # A tuple of its own, so that the same steps are counted anew.
-        self.steps = steps._replace(branches=steps.branches if known else np.zeros((len(steps.ends), 0)))
+        self.steps = steps._replace(branches=branches if known else np.zeros((len(steps.ends), 0)))
 
     def copy(self) -> IslandIntegrator:
         """Return an independent integrator that continues with the same bits."""
