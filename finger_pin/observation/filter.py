@@ -48,6 +48,11 @@ class FilterArgs(NamedTuple):
         variance: Of the readings, shape (s,).
         innovations: Filled: of each reading that was taken, over its standard deviation; NaN of others, shape (s,).
         gain: Memory, shape (N,).
+        slopes: Derivatives of signals, by what ``derivatives`` are by, shape (k, n + u + 3 t + p).
+        columns: Where in these the numbers of P stand, shape (N,).
+        signal_variance: Filled by `spread`: variances of the signals, shape (k,).
+        considered: Filled by it: of each number of the state the part of its variance that follows from p, shape (n,).
+        distance: Filled by it: F^T P_F^-1 F of the forces at each tip, shape (f / 3,).
     """
 
     advance: int
@@ -68,6 +73,11 @@ class FilterArgs(NamedTuple):
     variance: Vector
     innovations: Vector
     gain: Vector
+    slopes: Matrix
+    columns: Indices
+    signal_variance: Vector
+    considered: Vector
+    distance: Vector
 
 
 FILTER_ARGS = StructType(FilterArgs)
@@ -181,3 +191,47 @@ def correct(address: int, _time: float) -> int:
     if taken > 0:
         call_at(args.limit, args.period, 0.0)
     return taken
+
+
+@njit_inline
+def _force_distance(args: FilterArgs, tip: int) -> float:
+    """Return F^T P_F^-1 F of the forces at a tip, by Cholesky's factors: its squares are those of L^-1 F."""
+    first, factor, total = args.state.size + 3 * tip, args.product[0], 0.0
+    # L and L^-1 F, row by row.
+    for i in range(3):
+        at = args.force_at[3 * tip + i]
+        value = args.forces[at // 3, at % 3]
+        for j in range(i + 1):
+            entry = args.covariance[first + i, first + j]
+            for k in range(j):
+                entry -= factor[3 * i + k] * factor[3 * j + k]
+            factor[3 * i + j] = entry**0.5 if i == j else entry / factor[4 * j]
+        for j in range(i):
+            value -= factor[3 * i + j] * factor[9 + j]
+        factor[9 + i] = value / factor[4 * i]
+        total += factor[9 + i] ** 2
+    return total
+
+
+@CompiledFunction
+def spread(address: int, _time: float) -> int:
+    """Fill what the covariance of the `FilterArgs` at an address says of signals, parameters and forces."""
+    args = unpack(address, FILTER_ARGS)
+    p, wide = args.covariance, args.covariance.shape[0]
+    for s in range(args.signal_variance.size):
+        total = 0.0
+        for i in range(wide):
+            part = 0.0
+            for j in range(wide):
+                part += p[i, j] * args.slopes[s, args.columns[j]]
+            total += part * args.slopes[s, args.columns[i]]
+        args.signal_variance[s] = max(total, 0.0)
+    for i in range(args.considered.size):
+        total = 0.0
+        for j in range(args.state.size + args.force_at.size, wide):
+            if p[j, j] > 0.0:
+                total += p[i, j] * p[i, j] / p[j, j]
+        args.considered[i] = min(total / p[i, i], 1.0) if p[i, i] > 0.0 else 0.0
+    for tip in range(args.distance.size):
+        args.distance[tip] = _force_distance(args, tip)
+    return 1

@@ -18,7 +18,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.coerce import as_packed
 from finger_pin.mechanism.finger import Finger
 from finger_pin.observation.estimate import Band, Estimate
-from finger_pin.observation.filter import FILTER_ARGS, FilterArgs, correct, predict
+from finger_pin.observation.filter import FILTER_ARGS, FilterArgs, correct, predict, spread
 from finger_pin.observation.noise import assumed_forces, hidden_tension, period_noise, start_covariance
 from finger_pin.observation.record import Record
 from finger_pin.observation.sensors import Sensors
@@ -81,7 +81,6 @@ class Observer:
         # Of both signals that are watched.
         self._hidden = np.tile(self._quantile * hidden_tension(finger, self.sensors), 2)
         self._periods.watch(("tendon_tension", "spool_tension"))
-        self._known = np.where(self.uncertainty.deviations > 0.0, self.uncertainty.deviations, 1.0)
         size, held = len(self._periods.x), self._periods.derivatives.shape[1]
         self._columns = np.r_[
             np.arange(size), size + len(self._periods.inputs) + self._force_at, held - len(self.uncertainty.keys) : held
@@ -115,6 +114,11 @@ class Observer:
             variance=np.array([self.sensors.deviation[name] for name in read], dtype=float) ** 2,
             innovations=np.zeros(len(read)),
             gain=np.zeros(wide),
+            slopes=periods.watched()[1],
+            columns=self._columns,
+            signal_variance=np.zeros(len(self._hidden)),
+            considered=np.zeros(size),
+            distance=np.zeros(forces // 3),
         )
         self._block, self._bound = pack(self._filter, FILTER_ARGS), (read, h)
 
@@ -192,9 +196,10 @@ class Observer:
         if taken < len(read):
             skipped += [name for name, each in zip(read, innovations, strict=True) if each != each]
         self._count_missed(taken, len(read))
-        of_forces = slice(len(self._periods.x), len(self._periods.x) + len(self._force_at))
-        self._touch.follow(innovations, self._force, self._covariance[of_forces, of_forces], self.time, whole)
-        estimate = self._estimate(tuple(skipped), failure)
+        tension, _ = self._periods.watched()
+        spread(self._block.address)
+        self._touch.follow(innovations, self._filter.distance.tolist(), self.time, whole)
+        estimate = self._estimate(tension.copy(), tuple(skipped), failure)
         self._record.add(estimate, time.perf_counter() - begin)
         return estimate
 
@@ -266,34 +271,25 @@ class Observer:
         """Time from the start, s."""
         return self._periods.time - self._begin
 
-    def _estimate(self, skipped: tuple[str, ...], failure: str) -> Estimate:
+    def _estimate(self, tension: Array, skipped: tuple[str, ...], failure: str) -> Estimate:
         """Return the present estimate."""
-        periods, p, quantile = self._periods, self._covariance, self._quantile
+        periods, quantile = self._periods, self._quantile
         size, joints, forces = len(periods.x), len(self.finger.routing.joints), len(self._force_at)
-        variance = np.maximum(p.diagonal(), 0.0)
-        # Of the angles, what follows from numbers that readings do not correct.
-        considered = ((p[:joints, size + forces :] / self._known) ** 2).sum(axis=1) / variance[:joints]
-        force_variance = variance[size : size + forces]
-        tension, slopes = periods.watched()
-        slopes = slopes[:, self._columns]
-        half = np.maximum(
-            quantile * np.sqrt(np.maximum(((slopes @ p) * slopes).sum(axis=1), 0.0)), self._hidden - tension
-        )
+        deviation = np.sqrt(np.maximum(self._covariance.diagonal()[: size + forces], 0.0))
+        half = np.maximum(quantile * np.sqrt(self._filter.signal_variance), self._hidden - tension)
         cords = len(tension) // 2
         return Estimate(
             time=self.time,
-            joint_position=Band.around(periods.x[:joints].copy(), quantile * np.sqrt(variance[:joints])),
+            joint_position=Band.around(periods.x[:joints].copy(), quantile * deviation[:joints]),
             tendon_tension=Band.around(tension[:cords], half[:cords], 0.0),
             spool_tension=Band.around(tension[cords:], half[cords:], 0.0),
-            fingertip_force=Band.around(
-                periods.forces.ravel()[self._force_at].reshape(-1, 3), quantile * np.sqrt(force_variance).reshape(-1, 3)
-            ),
+            fingertip_force=Band.around(self._force, quantile * deviation[size:].reshape(-1, 3)),
             touched=self._touch.touched,
             since=self._touch.since.copy(),
             consistency=self._touch.consistency,
             observable={
-                "joint_position": np.clip(1.0 - considered, 0.0, 1.0),
-                "fingertip_force": np.clip(1.0 - force_variance / self._force_deviation**2, 0.0, 1.0).reshape(-1, 3),
+                "joint_position": 1.0 - self._filter.considered[:joints],
+                "fingertip_force": 1.0 - (deviation[size:] / self._force_deviation).reshape(-1, 3) ** 2,
             },
             skipped=skipped,
             failure=failure,

@@ -6,8 +6,6 @@ import numpy as np
 import scipy.stats
 from numpy.typing import NDArray
 
-from finger_pin.typing import Array
-
 # F^T P^-1 F from which a force presses, and below which none does any more: what its noise alone passes once in a
 # thousand and in ten times; and how long it must be beyond, s.
 _TOUCH, _LET_GO = (float(scipy.stats.chi2.ppf(level, 3)) for level in (0.999, 0.9))
@@ -34,22 +32,19 @@ class TouchMonitor:
         touched: NDArray[np.bool_] = self.since == self.since
         return touched
 
-    def follow(self, innovations: list[float], force: Array, covariance: Array, time: float, h: float) -> None:
+    def follow(self, innovations: list[float], distances: list[float], time: float, h: float) -> None:
         """Go on by a period, s, to a time, s.
 
         Args:
             innovations: Over their standard deviations, NaN for readings that were not taken.
-            force: Estimates, shape (f, 3), N.
-            covariance: Of the estimates, shape (3 f, 3 f).
+            distances: F^T P^-1 F of the force at each tip.
             time: s.
             h: s.
         """
         squares = [each * each for each in innovations if each == each]
         if squares:
             self.consistency += min(1.0, h / _CONSISTENCY_TIME) * (sum(squares) / len(squares) - self.consistency)
-        for k, vector in enumerate(force):
-            part = slice(3 * k, 3 * k + 3)
-            distance = float(vector @ np.linalg.solve(covariance[part, part], vector))
+        for k, distance in enumerate(distances):
             if distance < (_LET_GO if self.since[k] == self.since[k] else _TOUCH):
                 self.since[k] = self._beyond_since[k] = np.nan
             elif self._beyond_since[k] != self._beyond_since[k]:

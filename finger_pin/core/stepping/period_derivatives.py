@@ -32,6 +32,7 @@ from finger_pin.core.jit import (
     njit_inline,
     unpack,
 )
+from finger_pin.core.signals.state_batches import exert_alone
 from finger_pin.core.steps import integration as core
 from finger_pin.core.tables.linear_systems import Linear
 from finger_pin.core.tables.model import MODEL, Model
@@ -55,8 +56,9 @@ class PeriodArgs(NamedTuple):
         weights: Memory, a_k, shape (4,).
         right: Memory, shape (n + 1,).
         steps: By how much each number of the state, and of what is held, is changed for differences, shape (n + m,).
-        rows: Filled by `fill_rows`: forces and inputs of the rows at the state, and with each of these changed alone,
-            shape (2, 1 + n + m, K).
+        weights_of_rows: Weights of forces and inputs of the rows in the signals that are watched, shape (2, K, k).
+        watched: Filled by `fill_watched`: these signals at the state, shape (k,).
+        slopes: Filled by it: their derivatives by the state and what is held, shape (k, n + m).
         bristles: Places of bristles in the state, their rows, and columns of the rows' levels, shape (b, 3).
     """
 
@@ -71,7 +73,9 @@ class PeriodArgs(NamedTuple):
     weights: Vector
     right: Vector
     steps: Vector
-    rows: Layers
+    weights_of_rows: Layers
+    watched: Vector
+    slopes: Matrix
     bristles: IndexTable
 
 
@@ -79,32 +83,37 @@ PERIOD_ARGS = StructType(PeriodArgs)
 
 
 @njit_inline
-def _evaluate(address: int, state: Vector) -> None:
-    """Evaluate a model at a state."""
-    copy(state, unpack(address, MODEL).state)
-    call_at(unpack(address, MODEL).evaluate, address, 0.0)
+def _evaluate(address: int, state: Vector, rates: bool) -> None:
+    """Evaluate a model at a state, or its rows alone, which takes less."""
+    model = unpack(address, MODEL)
+    copy(state, model.state)
+    if rates:
+        call_at(model.evaluate, address, 0.0)
+    else:
+        copy(model.control.tension, model.work.command)
+        exert_alone(model, address, 0.0)
 
 
 @njit_inline
-def _evaluate_changed(period: PeriodArgs, state: Vector, column: int) -> int:
+def _evaluate_changed(period: PeriodArgs, state: Vector, column: int, rates: bool) -> int:
     """Evaluate at a state with what is held changed in one number; return the address of the model that has."""
     plain = unpack(period.plain, MODEL)
     inputs, forces, step = plain.control.tension, plain.parameters.tip_force, period.steps[state.size + column]
     if column < inputs.size:
         value = inputs[column]
         inputs[column] = value + step
-        _evaluate(period.plain, state)
+        _evaluate(period.plain, state, rates)
         inputs[column] = value
         return period.plain
     column -= inputs.size
     if column < 3 * forces.shape[0]:
         value = forces[column // 3, column % 3]
         forces[column // 3, column % 3] = value + step
-        _evaluate(period.plain, state)
+        _evaluate(period.plain, state, rates)
         forces[column // 3, column % 3] = value
         return period.plain
     address = period.varied[column - 3 * forces.shape[0]]
-    _evaluate(address, state)
+    _evaluate(address, state, rates)
     return address
 
 
@@ -113,12 +122,12 @@ def _fill_held(period: PeriodArgs, state: Vector) -> None:
     """Fill b at a state: derivatives of the rate by inputs, forces and parameters."""
     held, size = period.held, period.held.shape[0]
     plain = unpack(period.plain, MODEL)
-    _evaluate(period.plain, state)
+    _evaluate(period.plain, state, True)
     for i in range(size):
         for c in range(held.shape[1]):
             held[i, c] = plain.rate[i]
     for c in range(held.shape[1]):
-        changed = unpack(_evaluate_changed(period, state, c), MODEL)
+        changed = unpack(_evaluate_changed(period, state, c, True), MODEL)
         for i in range(size):
             held[i, c] = (changed.rate[i] - held[i, c]) / period.steps[size + c]
 
@@ -218,31 +227,40 @@ def limit_bristles(address: int, _time: float) -> int:
     period = unpack(address, PERIOD_ARGS)
     integration = unpack(unpack(period.args, core.ADVANCE_ARGS).integration, core.INTEGRATION)
     rows = unpack(period.plain, MODEL).work.rows
-    _evaluate(period.plain, integration.x)
+    _evaluate(period.plain, integration.x, False)
     for b in range(period.bristles.shape[0]):
         place, level = period.bristles[b, 0], rows[period.bristles[b, 2], period.bristles[b, 1]]
         integration.x[place] = min(max(integration.x[place], -level), level)
     return 1
 
 
+@njit_inline
+def _sum_rows(period: PeriodArgs, address: int, signal: int) -> float:
+    """Return a signal that is watched, after an evaluation of a model."""
+    rows, weights, total = unpack(address, MODEL).work.rows, period.weights_of_rows, 0.0
+    for k in range(rows.shape[1]):
+        total += weights[0, k, signal] * rows[ROW.force, k] + weights[1, k, signal] * rows[ROW.command, k]
+    return total
+
+
 @CompiledFunction
-def fill_rows(address: int, _time: float) -> int:
-    """Fill forces and inputs of the rows of the `PeriodArgs` at an address, and with one number changed each."""
+def fill_watched(address: int, _time: float) -> int:
+    """Fill the signals that are watched of the `PeriodArgs` at an address, and their derivatives."""
     period = unpack(address, PERIOD_ARGS)
     state = unpack(unpack(period.args, core.ADVANCE_ARGS).integration, core.INTEGRATION).x
-    size = state.size
-    for point in range(period.rows.shape[1]):
-        source = period.plain
-        if point <= size:
-            value = state[point - 1]
-            if point > 0:
-                state[point - 1] = value + period.steps[point - 1]
-            _evaluate(source, state)
-            if point > 0:
-                state[point - 1] = value
+    size, signals, source = state.size, period.watched.size, period.plain
+    _evaluate(source, state, False)
+    for s in range(signals):
+        period.watched[s] = _sum_rows(period, source, s)
+    for c in range(period.steps.size):
+        if c < size:
+            value = state[c]
+            state[c] = value + period.steps[c]
+            _evaluate(source, state, False)
+            state[c] = value
+            changed = source
         else:
-            source = _evaluate_changed(period, state, point - 1 - size)
-        rows = unpack(source, MODEL).work.rows
-        for k in range(rows.shape[1]):
-            period.rows[0, point, k], period.rows[1, point, k] = rows[ROW.force, k], rows[ROW.command, k]
+            changed = _evaluate_changed(period, state, c - size, False)
+        for s in range(signals):
+            period.slopes[s, c] = (_sum_rows(period, changed, s) - period.watched[s]) / period.steps[c]
     return 1

@@ -16,7 +16,7 @@ from finger_pin.core.stepping.period_derivatives import (
     PERIOD_ARGS,
     PeriodArgs,
     advance_period,
-    fill_rows,
+    fill_watched,
     limit_bristles,
 )
 from finger_pin.core.stepping.stepper import TABLEAUS
@@ -121,11 +121,12 @@ class PeriodMap:
             weights=np.zeros(4),
             right=np.zeros(size + 1),
             steps=np.concatenate([_STATE_CHANGE * finger.layout.scales(), changes]),
-            rows=np.zeros((2, 1 + size + held, len(structure.state))),
+            weights_of_rows=np.zeros((2, len(structure.state), 0)),
+            watched=np.zeros(0),
+            slopes=np.zeros((0, size + held)),
             bristles=self._bristles(),
         )
-        self._block = pack(self._args, PERIOD_ARGS)
-        self.address = self._block.address
+        self._bind()
         self.advance_address, self.limit_address = advance_period.address, limit_bristles.address
         self.restart(start)
 
@@ -195,7 +196,7 @@ class PeriodMap:
         Args:
             names: Of `FingerSignals`.
         """
-        count = self._args.rows.shape[-1]
+        count = self._args.weights_of_rows.shape[1]
         # A row's force or input of 1 alone gives its weight.
         buffer = self._evaluator.allocate(2 * count, "no_acceleration")
         rows = np.zeros((len(buffer.rows), 2 * count, count))
@@ -203,11 +204,21 @@ class PeriodMap:
         x, inputs = np.tile(self.x, (2 * count, 1)), np.tile(self.inputs, (2 * count, 1))
         evaluation = self._evaluator.to_evaluation(buffer._replace(rows=rows, packed=x))
         signals = self.finger.signals(x, inputs, None, evaluation)
-        self._weights = np.concatenate([signals[name] for name in names], axis=-1).reshape(2, count, -1)
+        weights = np.concatenate([signals[name] for name in names], axis=-1).reshape(2, count, -1)
+        number = weights.shape[-1]
+        slopes = np.zeros((number, len(self._args.steps)))
+        self._args = self._args._replace(weights_of_rows=weights, watched=np.zeros(number), slopes=slopes)
+        self._bind()
+
+    def _bind(self) -> None:
+        """Bind the arguments of compiled code."""
+        self._block = pack(self._args, PERIOD_ARGS)
+        self.address = self._block.address
 
     def watched(self) -> tuple[Array, Array]:
-        """Return the signals that are watched, shape (k,), and their derivatives, shape (k, n + m)."""
-        fill_rows(self.address)
-        rows, weights = self._args.rows, self._weights
-        values = rows[0] @ weights[0] + rows[1] @ weights[1]
-        return values[0], (values[1:] - values[0]).T / self._args.steps
+        """Return the signals that are watched, shape (k,), and their derivatives, shape (k, n + m).
+
+        They are overwritten at the next call.
+        """
+        fill_watched(self.address)
+        return self._args.watched, self._args.slopes
