@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from random_fingers import CHAIN_FEATURES, Feature, chain, direction, swing
 from random_surroundings import TREE_FEATURES
-from random_trees import tree
+from random_trees import tendon_coupling, tree
 
 from finger_pin.description.caching import cached_property
 from finger_pin.description.loading import read_scenario
@@ -173,7 +173,7 @@ def _each_finger(feature: Feature) -> Feature:
 _OF_RUNS: dict[str, Feature] = {"swinging inputs": _swinging, "start time": _start_time, "tip force": _tip_force}
 #: All features by the kind of model that may have them, one a line in the tables of the modules that add them.
 FEATURES: dict[str, dict[str, Feature]] = {
-    "tree": TREE_FEATURES | _OF_RUNS,
+    "tree": TREE_FEATURES | _OF_RUNS | {"tendon coupling": tendon_coupling},
     "finger": CHAIN_FEATURES | _OF_RUNS,
     "hand": {name: _each_finger(feature) for name, feature in CHAIN_FEATURES.items()}
     | _OF_RUNS

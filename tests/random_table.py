@@ -56,7 +56,7 @@ class Door(NamedTuple):
 # and winches are not, either, and delays are of steps.
 _NOT_IN_MUJOCO = (
     *("servo", "play", "position drive", "winch", "maximum tension", "delay", "slew", "moved object", "free object"),
-    *("fixed object", "joint path", "coupling", "loop", "tendon range"),
+    *("fixed object", "joint path", "coupling", "tendon coupling", "loop", "tendon range"),
 )
 # Its file lacks hysteresis, and damps cords with slack at any length, as it says; inputs are held there. An integral
 # may push a cord, which has no tension then.
@@ -72,6 +72,7 @@ _NOT_SETTLED = (
     *("joint friction", "joint drag", "one per joint", "swinging inputs", "start time", "cord", "wraps", "pulleys"),
     *("sum of joints", "tendon range", "joint path", "coupling", "loop", "motor", "joint servo", "lag", "integrator"),
     *("integral", "slew", "delay", "muscle", "fixed object", "free object", "moved object", "keyframe"),
+    "tendon coupling",
 )
 # What is more than tensions that are held: recordings give those alone.
 _NOT_RECORDED = ("servo", "play", "position drive", "winch", "passive tendon", *_NOT_HELD)

@@ -221,6 +221,19 @@ def coupling(rng: np.random.Generator, table: Table) -> bool:
     return True
 
 
+def tendon_coupling(rng: np.random.Generator, table: Table) -> bool:
+    """Let a tendon that no ideal source pulls follow another, or hold one."""
+    inner, pulled = table["finger"]["tree"], [each.get("along") for each in table["finger"]["tendons"].values()]
+    names = [str(name) for name in rng.permutation([name for name in inner["tendons"] if name not in pulled])]
+    if not names:
+        return False
+    held = {"tendon": names[0], "stiffness": decades(rng, 1e2, 1e4), "damping": decades(rng, 0.1, 10.0)}
+    if len(names) > 1:
+        held |= {"other": names[1], "ratio": float(rng.normal())}
+    inner.setdefault("couplings", {})["bar"] = held | {"offset": float(rng.normal(0.0, 1e-3))}
+    return True
+
+
 def loop(rng: np.random.Generator, table: Table) -> bool:
     """Pin a point of the last body near to where it starts."""
     inner = table["finger"]["tree"]

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from finger_pin.description.fields import without
 from finger_pin.description.friction import WITHOUT_STRIBECK
+from finger_pin.description.tree_couplings import coupled
 from finger_pin.description.validation import Description, problem
 
 
@@ -94,6 +95,12 @@ OF_FINGER = (
     Rule("joints.*", ("link",), lambda it, _: it.links, "has no effect beside a tree, whose bodies are the links"),
     _without("actuators.*", ("position_loop",), "drive", "tension"),
     _without("actuators.*", ("friction_compensation", "reversal_speed"), "drive", "position"),
+    Rule(
+        "tendons.*",
+        ("along",),
+        lambda finger, tendon: not coupled(finger.tree.couplings, tendon.along),
+        "is for a tendon without coupling: tree.actuators pull it, so that it rubs by the sum of its tensions",
+    ),
     _beside("tree.tendons.*", ("rest",), "stiffness"),
     Rule(
         "tree.tendons.*",

@@ -174,7 +174,7 @@ def _named_in_hand(tree: Tree, finger: str, base: str) -> dict[str, dict[str, An
             joints=lambda gains: gains and keyed(gains),
             path=lambda path: path and keyed(path, body=on_body, side_point=side),
         ),
-        "couplings": keyed(tree.couplings, joint=named, other=named),
+        "couplings": keyed(tree.couplings, joint=named, tendon=named, other=named),
         "loops": keyed(tree.loops, body=on_body, other=on_body),
         "actuators": keyed(tree.actuators, joint=named, tendon=named),
         "keyframes": keyed(tree.keyframes, position=keyed, velocity=keyed, inputs=keyed),

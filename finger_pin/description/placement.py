@@ -105,7 +105,8 @@ def _scaled_tree(tree: Any, scale: float) -> Any:
         return each.updated(reference=size * each.reference, armature=each.armature / size**2, path=path)
 
     def coupling(each: Any) -> Any:
-        of_joint, of_other = grown[each.joint], grown.get(each.other, 1.0)
+        # Tendons are as long as the tree is large.
+        of_joint, of_other = (scale, scale) if each.tendon else (grown[each.joint], grown.get(each.other, 1.0))
         powers = tuple(value * of_joint / of_other**power for power, value in enumerate(each.higher, 2))
         rolling = each.rolling and (each.rolling[0] * of_other, each.rolling[1] * of_joint)
         linear = {"ratio": each.ratio * of_joint / of_other, "offset": each.offset * of_joint}

@@ -22,7 +22,8 @@ from finger_pin.description.placement import PathSignal
 from finger_pin.description.primitives import KINDS
 from finger_pin.description.surface import BodyShape
 from finger_pin.description.tree_actuators import TreeActuator
-from finger_pin.description.tree_parts import Body, Coupling, Keyframe, Loop, Tip, TreeJoint, TreeSolid, TreeTendon
+from finger_pin.description.tree_couplings import Coupling, coupled
+from finger_pin.description.tree_parts import Body, Keyframe, Loop, Tip, TreeJoint, TreeSolid, TreeTendon
 from finger_pin.description.validation import Description, Name, problem, suggestion
 from finger_pin.description.waypoints import Waypoint
 from finger_pin.typing import Array
@@ -69,8 +70,9 @@ class Tree(Description):
                 side = place.side_point.body if place.side_point else None
                 _check(f"tendons.{name}.path.{point}.side_point.body", side, self.bodies, "body")
         for name, coupling in self.couplings.items():
-            _check(f"couplings.{name}.joint", coupling.joint, self.joints, "joint")
-            _check(f"couplings.{name}.other", coupling.other, self.joints, "joint")
+            kind, names = ("joint", [*self.joints]) if coupling.joint else ("tendon", [*self.tendons])
+            _check(f"couplings.{name}.{kind}", coupling.follower, names, kind)
+            _check(f"couplings.{name}.other", coupling.other, names, kind)
         for name, loop in self.loops.items():
             _check(f"loops.{name}.body", loop.body, self.bodies, "body")
             _check(f"loops.{name}.other", loop.other, self.bodies, "body")
@@ -233,7 +235,7 @@ class Tree(Description):
 
     @property
     def rubbing(self) -> tuple[str, ...]:
-        """Names of the tendons that rub as they are pulled by springs, ranges, actuators or what drives their joint.
+        """Names of the tendons that rub: springs, ranges, actuators, couplings or what drives their joint pulls them.
 
         A sum of joint positions is a cord where it winds about hinges at radii; else it is a transmission.
         """
@@ -248,17 +250,17 @@ class Tree(Description):
     def _is_pulled(self, name: str) -> bool:
         tendon = self.tendons[name]
         driven = any(each.tendon == name for each in self.actuators.values())
-        return driven or tendon.stiffness > 0.0 or tendon.range is not None
+        return driven or tendon.stiffness > 0.0 or tendon.range is not None or bool(coupled(self.couplings, name))
 
     def linked(self, name: str) -> dict[str, float]:
         """Return the shares of actuators' forces that pull a cord about the one joint that they drive, by actuator.
 
         A model whose actuators turn joints says nothing of the cords that do it: those about a joint that pull the same
-        way share its torque. Empty for cords that have a spring or an actuator of their own.
+        way share its torque. Empty for cords that have a spring, a coupling or an actuator of their own.
         """
         tendon = self.tendons[name]
         driven = any(each.tendon == name for each in self.actuators.values())
-        if len(tendon.wound) != 1 or driven or tendon.stiffness > 0.0:
+        if len(tendon.wound) != 1 or driven or tendon.stiffness > 0.0 or coupled(self.couplings, name):
             return {}
         ((joint, radius),) = tendon.wound.items()
         sharing = sum(other * radius > 0.0 for other in self._radii_about(joint))

@@ -15,13 +15,11 @@ from finger_pin.description.validation import (
     MOST_ANGLE,
     Description,
     Name,
-    Numbers,
     choice,
     direction,
     problem,
     quantity,
     real,
-    reals,
     vector,
 )
 from finger_pin.description.waypoints import BODY_POINT, Waypoint, check_path
@@ -35,8 +33,6 @@ MATERIALS: dict[str, tuple[float, float, float, float]] = {
     "pad": (0.90, 0.38, 0.18, 1.0),
     "palm": (0.30, 0.34, 0.40, 1.0),
 }
-#: The highest power of a coupling.
-MOST_POWER = 7
 Pair = tuple[float, float]
 
 
@@ -195,55 +191,6 @@ class TreeTendon(Description):
     def wound(self) -> dict[str, float]:
         """Radii about the joints that it winds about, m, by joint; none with a path, which shows where it bends."""
         return {joint: gain for joint, gain in (self.joints or {}).items() if gain and self.path is None}
-
-
-class Coupling(Description):
-    """A joint that follows another: q = offset + ratio q_other + powers[0] q_other^2 + ..., held by a stiff spring.
-
-    Two hinges in a row whose surfaces roll on each other, a rolling joint, have r q = r_other q_other: the arcs on both
-    surfaces are equally long. The body between them is then as long as the radii together.
-    """
-
-    joint: Name = Field(description="The joint that follows.")
-    other: Name | None = Field(None, description="The joint that it follows; none: it is held.")
-    ratio: Annotated[float, real(-1e3, 1e3)] = quantity(
-        0.0, unit="1", source="design", doc="Angle of this joint per angle of the other."
-    )
-    offset: Annotated[float, real(-1e3, 1e3)] = quantity(
-        0.0, unit="rad", source="design", doc="Angle of this joint where the other is at zero."
-    )
-    powers: Annotated[Numbers, reals(-1e6, 1e6)] = quantity(
-        0.0, unit="1", source="design", doc="Coefficients of the square of q_other and of higher powers, at most six."
-    )
-    rolling: Annotated[tuple[float, float], vector(2, 1e-6, 10.0)] | None = quantity(
-        None, unit="m", source="design", doc="Radii of surfaces that roll, of this joint and the other."
-    )
-    stiffness: Annotated[float, real(0.0, _LARGE)] = quantity(
-        100.0, unit="N m/rad", source="estimate", doc="k, of the spring that holds the joint on its course."
-    )
-    damping: Annotated[float, real(0.0, _LARGE)] = quantity(
-        0.1, unit="N m s/rad", source="estimate", doc="c, damping of that spring."
-    )
-
-    @property
-    def slope(self) -> float:
-        """The ratio, also of rolling surfaces."""
-        return self.rolling[1] / self.rolling[0] if self.rolling else self.ratio
-
-    @property
-    def higher(self) -> tuple[float, ...]:
-        """Coefficients of the square and of higher powers."""
-        return self.powers if isinstance(self.powers, tuple) else (self.powers,)
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Self:
-        if len(self.higher) > MOST_POWER - 1:
-            raise problem("powers", f"must be at most {MOST_POWER - 1} numbers", list(self.higher))
-        if self.other is None and (self.slope or any(self.higher)):
-            raise problem("other", "is missing: ratio, powers and rolling are those of another joint")
-        if self.rolling and (self.ratio or any(self.higher)):
-            raise problem("rolling", "is the ratio: leave out ratio and powers", list(self.rolling))
-        return self
 
 
 class Loop(Description):

@@ -23,7 +23,7 @@ from finger_pin.exchange.mujoco_equalities import linked_bodies, read_equalities
 from finger_pin.exchange.mujoco_free import FreeBodies, MocapBodies
 from finger_pin.exchange.mujoco_keyframes import read_keyframes
 from finger_pin.exchange.mujoco_meshes import Meshes
-from finger_pin.exchange.mujoco_names import Names, Table, entry_name, quaternion, unused_name
+from finger_pin.exchange.mujoco_names import Names, Table, entry_name, quaternion
 from finger_pin.exchange.mujoco_overlay import add_tendons
 from finger_pin.exchange.mujoco_shapes import Shapes
 from finger_pin.exchange.mujoco_tendons import TendonReader, passed_bodies
@@ -128,8 +128,7 @@ class _Reader:
         tendons = {self.names.tendons[i]: reader.table(i) for i in range(model.ntendon)}
         bodies = self.bodies
         actuators, pulled = self.actuators.table(), self.actuators.pulled_tendons()
-        used_names = {*tendons, *pulled}
-        couplings, loops, differences = read_equalities(self._reader)
+        couplings, loops = read_equalities(self._reader)
         joints, moving, loss = self._joints()
         stops = read_stops(self._reader, joints)
         objects, pairs = self.shapes.objects(self.free.object_bodies), self.shapes.pairs(bodies)
@@ -146,8 +145,7 @@ class _Reader:
             "tree": {
                 "bodies": self._world_body() | {self.names.bodies[i]: self._body(i) for i in bodies},
                 "joints": moving,
-                "tendons": tendons
-                | {unused_name(name, used_names, "equality"): each for name, each in differences.items()},
+                "tendons": tendons,
                 "couplings": couplings,
                 "loops": loops,
                 "actuators": actuators,

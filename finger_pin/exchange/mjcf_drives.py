@@ -12,7 +12,8 @@ from numpy.polynomial import Polynomial
 
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.tree_actuators import TreeActuator
-from finger_pin.description.tree_parts import Coupling, Keyframe
+from finger_pin.description.tree_couplings import Coupling
+from finger_pin.description.tree_parts import Keyframe
 from finger_pin.exceptions import InputError
 from finger_pin.exchange.mjcf_compliance import Mobility, soft
 from finger_pin.mechanism.xml_numbers import numbers
@@ -29,22 +30,23 @@ _MAX_TENSION = 1e3
 def add_equalities(
     root: ET.Element, description: FingerDescription, bodies: Mapping[str | None, ET.Element], mobility: Mobility
 ) -> None:
-    """Add couplings of joints, and loops by a site on each body.
+    """Add couplings of joints and tendons, and loops by a site on each body.
 
     Args:
         root: Of the MJCF.
         description: The finger.
         bodies: Elements by body; that of the world by None.
-        mobility: Of its joints and bodies.
+        mobility: Of its joints, tendons and bodies.
     """
     tree = description.tree
     table = ET.SubElement(root, "equality")
     for name, coupling in tree.couplings.items():
-        joints = [coupling.joint, *([coupling.other] if coupling.other else [])]
-        softness = soft(coupling.stiffness, coupling.damping, sum(mobility.joints[joint] for joint in joints))
-        joint_names = {f"joint{k + 1}": joint for k, joint in enumerate(joints)}
+        kind, of_kind = ("joint", mobility.joints) if coupling.joint else ("tendon", mobility.tendons)
+        names = [coupling.follower, *([coupling.other] if coupling.other else [])]
+        softness = soft(coupling.stiffness, coupling.damping, sum(of_kind[each] for each in names))
+        named = {f"{kind}{k + 1}": each for k, each in enumerate(names)}
         polynomial = _polynomial(f"{description.entry('tree.couplings', name)}.powers", coupling, description)
-        ET.SubElement(table, "joint", {"name": name, **joint_names, "polycoef": numbers(*polynomial), **softness})
+        ET.SubElement(table, kind, {"name": name, **named, "polycoef": numbers(*polynomial), **softness})
     for name, loop in tree.loops.items():
         ends = ((loop.body, loop.position), (loop.other, loop.other_position))
         for k, (body, position) in enumerate(ends, 1):
@@ -55,9 +57,11 @@ def add_equalities(
 
 def _polynomial(entry: str, coupling: Coupling, description: FingerDescription) -> list[float]:
     """Return the polynomial of a coupling in MuJoCo's terms: both joints count from their references."""
-    tree, absolute = description.tree, Polynomial([coupling.offset, coupling.slope, *coupling.higher])
-    start = tree.joints[coupling.other].reference if coupling.other else 0.0
-    coefficients = (absolute(Polynomial([start, 1.0])) - tree.joints[coupling.joint].reference).coef
+    absolute = Polynomial([coupling.offset, coupling.slope, *coupling.higher])
+    # Lengths of tendons count from their references here as well.
+    references = {} if coupling.tendon else {name: each.reference for name, each in description.tree.joints.items()}
+    starts = [references.get(end, 0.0) if end else 0.0 for end in (coupling.joint, coupling.other)]
+    coefficients = (absolute(Polynomial([starts[1], 1.0])) - starts[0]).coef
     if np.any(coefficients[_MAX_POWER + 1 :]):
         raise InputError(entry, f"is not written: MuJoCo has powers up to {_MAX_POWER}", list(coupling.higher))
     return [*coefficients[: _MAX_POWER + 1].tolist(), *[0.0] * (_MAX_POWER + 1 - len(coefficients))]

@@ -8,6 +8,7 @@ from pydantic import ValidationError
 from finger_pin.description.caching import cached_property
 from finger_pin.description.tree import LARGEST_RADIUS
 from finger_pin.description.tree_actuators import Muscle
+from finger_pin.exchange.mujoco_equalities import coupled_tendons
 from finger_pin.exchange.mujoco_names import Table, model_name, unused_name
 from finger_pin.exchange.mujoco_unsupported import ElementReader, is_disabled
 from finger_pin.typing import Array
@@ -295,5 +296,5 @@ class ActuatorReader(ElementReader):
             if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE or abs(arm) > LARGEST_RADIUS:
                 return False
         ends = self._tension_ends(i)
-        # One that never lets go has a range of inputs, as other actuators.
-        return bool(np.min(ends) == 0.0 and np.any(ends))
+        # One that never lets go, or whose tendon another holds, has a range of inputs, as other actuators.
+        return bool(np.min(ends) == 0.0 and np.any(ends) and tendon not in coupled_tendons(mujoco, model))

@@ -1,4 +1,4 @@
-"""Equalities of a MuJoCo model, as stiff springs: joints, points of bodies, fixed tendons; the others are listed."""
+"""Equalities of a MuJoCo model, as stiff springs: joints, points of bodies, tendons; the others are listed."""
 
 from __future__ import annotations
 
@@ -32,12 +32,23 @@ def _bodies(mujoco: Any, model: Any, i: int) -> list[int]:
     return [int(model.site_bodyid[each]) if of_sites else each for each in ids]
 
 
-def read_equalities(reader: ElementReader) -> tuple[Table, Table, Table]:
-    """Return couplings of joints, loops, and the tendons that stand for equalities of tendons, each by name."""
+def coupled_tendons(mujoco: Any, model: Any) -> set[int]:
+    """Return the tendons that equalities hold which are carried over."""
+    couplings = [i for i in np.flatnonzero(model.eq_active0) if _is_linear(mujoco, model, int(i))]
+    return {tendon for i in couplings for tendon in _elements(model, int(i))}
+
+
+def _is_linear(mujoco: Any, model: Any, i: int) -> bool:
+    """Return whether an equality is one of tendons, and linear."""
+    of_tendons = model.eq_type[i] == mujoco.mjtEq.mjEQ_TENDON
+    return bool(of_tendons and not (len(_elements(model, i)) > 1 and np.any(model.eq_data[i, 2:5])))
+
+
+def read_equalities(reader: ElementReader) -> tuple[Table, Table]:
+    """Return couplings of joints and of tendons, and loops, each by name."""
     mujoco, model, left_out = reader.mujoco, reader.model, reader.left_out
     couplings: Table = {}
     loops: Table = {}
-    tendons: Table = {}
     for i in (int(each) for each in np.flatnonzero(model.eq_active0)):
         name = model_name(model, "equality", i)
         kind = mujoco.mjtEq(int(model.eq_type[i])).name.removeprefix("mjEQ_").lower()
@@ -46,15 +57,13 @@ def read_equalities(reader: ElementReader) -> tuple[Table, Table, Table]:
             loops |= {f"{name}_{k}" if len(points) > 1 else name: point for k, point in enumerate(points)}
         elif kind == "joint":
             couplings[name] = _coupling(reader, i)
-        elif kind != "tendon":
-            left_out.add(f"equality {name}: of kind {kind}")
-        elif np.any(model.eq_data[i, 2:5]):
-            left_out.add(f"equality {name}: its polynomial is not linear")
-        elif any(model.wrap_type[model.tendon_adr[_elements(model, i)]] != mujoco.mjtWrap.mjWRAP_JOINT):
-            left_out.add(f"equality {name}: of tendons through space")
+        elif _is_linear(mujoco, model, i):
+            couplings[name] = _tendon_coupling(reader, i)
         else:
-            tendons[name] = _difference(reader, i)
-    return _with_entry_names(couplings), _with_entry_names(loops), _with_entry_names(tendons)
+            left_out.add(
+                f"equality {name}: {'its polynomial is not linear' if kind == 'tendon' else f'of kind {kind}'}"
+            )
+    return _with_entry_names(couplings), _with_entry_names(loops)
 
 
 def _points(reader: ElementReader, i: int) -> list[Table]:
@@ -164,16 +173,10 @@ def _list_multiturn(reader: ElementReader, i: int, joint: int) -> None:
         reader.left_out.add(f"equality {name}: powers of the angle of {joint_name} repeat beyond half a turn")
 
 
-def _difference(reader: ElementReader, i: int) -> Table:
-    """Return an equality of fixed tendons as a spring of a tendon as long as their difference."""
-    model = reader.model
-    tendons, ratios = _elements(model, i), (1.0, -float(model.eq_data[i, 1]))
-    coefficients: dict[str, float] = {}
-    rest, mobility = float(model.eq_data[i, 0]), 0.0
-    for tendon, ratio in zip(tendons, ratios, strict=False):
-        rest += ratio * float(model.tendon_length0[tendon])
-        mobility += float(model.tendon_invweight0[tendon])
-        for k in range(model.tendon_adr[tendon], model.tendon_adr[tendon] + model.tendon_num[tendon]):
-            joint = reader.names.joints[model.wrap_objid[k]]
-            coefficients[joint] = coefficients.get(joint, 0.0) + ratio * float(model.wrap_prm[k])
-    return {"joints": coefficients, "rest": [rest, rest], **_spring(reader, i, mobility)}
+def _tendon_coupling(reader: ElementReader, i: int) -> Table:
+    """Return an equality of a tendon with another, or with a number: lengths count from the references of both."""
+    model, elements = reader.model, _elements(reader.model, i)
+    spring = _spring(reader, i, float(np.sum(model.tendon_invweight0[elements])))
+    first, *others = (reader.names.tendons[each] for each in elements)
+    other = {"other": others[0], "ratio": float(model.eq_data[i, 1])} if others else {}
+    return {"tendon": first, "offset": float(model.eq_data[i, 0]), **spring, **other}

@@ -1,8 +1,8 @@
 """Friction of tendons that other rows pull (14), (16): tendons of a tree, branches behind pulleys, further wraps.
 
-A tendon of a tree is pulled by its spring, its range, actuators, or what drives the joint that it winds about; its
-friction is a row that exerts what the canal changes of their tension. A pulley divides the tension that friction has
-left, and each branch behind it rubs by its own bend at its own tension, as it slides by itself.
+A tendon of a tree is pulled by its spring, its range, couplings, actuators, or what drives the joint that it winds
+about; its friction is a row that exerts what the canal changes of their tension. A pulley divides the tension that
+friction has left, and each branch behind it rubs by its own bend at its own tension, as it slides by itself.
 
 Where tendons rub at their bends, each wrap is such a row: along the tendon from there to its end, pulled by what the
 wraps before have left. With T_(k-1) and T_k before and behind wrap k, joints between it and the next one feel T_k, and
@@ -17,6 +17,7 @@ import numpy as np
 
 from finger_pin.description.cords import Cord
 from finger_pin.description.finger_description import FingerDescription
+from finger_pin.description.tree_couplings import coupled
 from finger_pin.laws.capstan import CANAL_FRICTION, CORD_TENSION
 from finger_pin.mechanism.groups import BRANCHES, CANALS, CORDS, ELASTIC, SOURCES, TENDON_LOSSES, WRAPS
 from finger_pin.mechanism.rows import Rows
@@ -139,6 +140,9 @@ class Canals:
             if actuator.tendon == name:
                 sources[actuator_table(actuator), key] = -actuator.gear
                 one_way &= actuator.only_pulls
+        for key, part in coupled(tree.couplings, name).items():
+            sources["coupling", key] = part
+            one_way = False
         if tree.linked(name):
             sources[CORDS, name] = 1.0
         return sources, one_way

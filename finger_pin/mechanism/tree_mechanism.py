@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.routing import routing_parts
 from finger_pin.description.tree import Tree
 from finger_pin.description.tree_actuators import TreeActuator
-from finger_pin.description.tree_parts import Coupling
+from finger_pin.description.tree_couplings import Coupling
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.bodies import place_bodies
 from finger_pin.mechanism.groups import ACTUATORS, ELASTIC, MUSCLES, STATEFUL, STATELESS, TREE_TABLES
@@ -137,15 +138,20 @@ def _tendons(tree: Tree, routes: TendonPaths) -> list[_Described]:
 
 
 def _couplings(description: FingerDescription, routes: TendonPaths) -> _Described:
-    """Return the springs that hold joints to others: each is a constraint q - f(q_other)."""
-    couplings = description.tree.couplings
-    cords = [
-        Cord(_about(each.joint).elements + (_about(each.other, each.slope).elements if each.other else ()))
-        for each in couplings.values()
-    ]
-    arms, _ = routes.along(cords)
-    numbers = [(each.stiffness, each.offset, each.damping) for each in couplings.values()]
-    paths = tuple(_higher_powers(description, routes, each) for each in couplings.values())
+    """Return the springs that hold joints or tendons to others: each is a constraint q - f(q_other)."""
+    couplings, ends, numbers = description.tree.couplings, list[tuple[Array, Paths]](), list[Sequence[float]]()
+    for each in couplings.values():
+        names = (each.follower, *([each.other] if each.other else ()))
+        factors, rest = (1.0, -each.slope)[: len(names)], each.offset
+        if each.tendon:
+            rest += sum(factor * routes.reference_lengths[name] for factor, name in zip(factors, names, strict=True))
+        ends.append(routes.along((routes.cords[name] if each.tendon else _about(name) for name in names), factors))
+        numbers.append((each.stiffness, rest, each.damping))
+    arms = np.array([arm.sum(axis=0) for arm, _ in ends])
+    paths = tuple(
+        (*chain(*legs), *_higher_powers(description, routes, each))
+        for (_, legs), each in zip(ends, couplings.values(), strict=True)
+    )
     return "coupling", couplings, numbers, (arms, paths)
 
 

@@ -13,7 +13,8 @@ from finger_pin.description.links import BASE, TIP, is_base
 from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.primitives import KINDS
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.tree_parts import MATERIALS, Body, Coupling, TreeJoint, TreeSolid
+from finger_pin.description.tree_couplings import Coupling
+from finger_pin.description.tree_parts import MATERIALS, Body, TreeJoint, TreeSolid
 from finger_pin.mechanism.body_places import joint_placement, rotation
 from finger_pin.mechanism.xml_numbers import numbers as _numbers
 

@@ -17,7 +17,8 @@ pytestmark = pytest.mark.filterwarnings("ignore:hand. not carried over")
 
 def test_elements_that_are_not_carried_over_are_listed():
     straight = '<spatial name="straight"><site site="s"/><site site="base"/></spatial></tendon>'
-    rest = f"""{FIXED.replace("</tendon>", straight)}<equality><tendon name="both" tendon1="t" tendon2="straight"/>
+    curved = '<tendon name="both" tendon1="t" tendon2="straight" polycoef="0 1 .1 0 0"/>'
+    rest = f"""{FIXED.replace("</tendon>", straight)}<equality>{curved}
     <connect name="led" body1="w" body2="hand" anchor="0 0 0"/></equality>
     <actuator><velocity joint="j" kv="1"/><general joint="j" dyntype="user" actdim="2" actrange="-1 1"/>
     <adhesion body="w" ctrlrange="0 1"/></actuator>"""
@@ -29,7 +30,7 @@ def test_elements_that_are_not_carried_over_are_listed():
         "contacts are disabled in the model: its geoms touch nothing",
         "actuator actuator_1: it has dynamics of its own",
         "actuator actuator_2: it drives a body",
-        "equality both: of tendons through space",
+        "equality both: its polynomial is not linear",
         "free body thing: an object is one sphere, box, cylinder, capsule or ellipsoid",
     )
     assert list(description.tree.actuators) == ["actuator_0"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from finger_pin.description.tree_parts import MOST_POWER
+from finger_pin.description.tree_couplings import MOST_POWER
 from finger_pin.mechanism.gaps.signed_distance import POINT, SLOPE_WIDTH
 from finger_pin.mechanism.spans.span import SPAN_OUT, SPAN_OUT_SIZE, SPAN_SLOPE, SPAN_SLOPE_SIZE, WrapSegment, clear
 from finger_pin.typing import Pointer
