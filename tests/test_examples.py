@@ -119,6 +119,15 @@ def test_what_bends_of_a_cord_leave_is_the_capstan_law(example):
     assert names["shares"][4.0] > 1.0
 
 
+def test_an_observer_of_a_motor_sees_a_touch_soon_and_its_bands_hold_the_angles_before(example):
+    names = example("observed_touch")
+    seen, gone = names["touches"]
+    assert 1.0 < seen < 1.1 and 1.3 < gone < 1.5
+    truth, result = names["truth"].joint_position.values[1:], names["result"]
+    inside = (truth >= result.joint_position_low) & (truth <= result.joint_position_high)
+    assert inside.sel(time=slice(0.0, 1.0)).all() and inside.sel(time=slice(1.6, 2.5)).mean() > 0.9
+
+
 def test_a_policy_is_as_good_in_an_environment_of_its_own_and_better_than_none(example):
     gymnasium = pytest.importorskip("gymnasium")
     names = example("train_policy")

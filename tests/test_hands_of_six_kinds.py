@@ -86,6 +86,7 @@ LINES = {
     "sweep": (["s.toml", "--over", "simulation.duration=0.02,0.05"],),
     "optimise": (["s.toml", "--population", "4", "--generations", "1"],),
     "identify": (),
+    "observe": (["s.toml", "log.csv", "--no-figures"],),
     "self_locking": (["s.toml"],),
     "force_capability": (["f.toml"], ["f.toml", "--limit", "servos", "--force", "0,0,-1"]),
     "export": (["f.toml", "x.urdf"], ["s.toml", "x.xml"], ["s.toml", "x.toml"], ["r.nc", "x.csv"]),
@@ -134,6 +135,7 @@ def hand(request, tmp_path_factory):
     (folder / "s.toml").write_text(fp.to_toml(scenario))
     result = fp.simulate(scenario)
     fp.save(result, folder / "r.nc")
+    (folder / "log.csv").write_text("time,inputs.m\n0,0\n0.001,0\n")
     built = fp.Finger(description)
     return SimpleNamespace(folder=folder, description=description, scenario=scenario, result=result, built=built)
 

@@ -20,6 +20,7 @@ from finger_pin.commands import (
     export,
     force_capability,
     identify_command,
+    observe_command,
     optimise,
     play,
     self_locking,
@@ -37,6 +38,7 @@ COMMANDS = (
     sweep.sweep,
     optimise.optimise,
     identify_command.identify,
+    observe_command.observe,
     self_locking.self_locking,
     force_capability.force_capability,
     export.export,
@@ -126,7 +128,7 @@ def _usage_message(error: typer.TyperException, command_line: Sequence[str]) -> 
     """Return the message about a wrong command line: the option, its value and the allowed ones, or all options."""
     option, context = getattr(error, "option_name", None), getattr(error, "ctx", None)
     text = str(error.format_message()) if hasattr(error, "format_message") else str(error)
-    if isinstance(error, typer.BadParameter) and error.param is not None:
+    if isinstance(error, typer.BadParameter) and error.param is not None and error.message:
         names = error.param.opts
         values = [argument for name, argument in pairwise(command_line) if name in names]
         values += [

@@ -103,6 +103,28 @@ def refuse_format(figures: bool, format: str | None) -> None:
         raise invalid("--format", "has no effect with --no-figures")
 
 
+def pairs(option: str, texts: list[str], form: str) -> dict[str, str]:
+    """Return the texts on both sides of the first equals sign of each text of a repeatable option.
+
+    Args:
+        option: Its name.
+        texts: Such as ``KEY=VALUE``.
+        form: What a text must be, in words.
+
+    Raises:
+        TyperException: If a text is wrong, or two begin alike.
+    """
+    values: dict[str, str] = {}
+    for text in texts:
+        key, equals, value = text.partition("=")
+        if not equals or not key.strip():
+            raise invalid(option, f"{text}: must be {form}")
+        if key.strip() in values:
+            raise invalid(option, f"{text}: an earlier one sets the same entry")
+        values[key.strip()] = value
+    return values
+
+
 def overrides(settings: list[str], **short_options: str | None) -> dict[str, Any]:
     """Return overrides of `load_scenario` from texts KEY=VALUE, the value in TOML or a string without quotes.
 
@@ -113,14 +135,8 @@ def overrides(settings: list[str], **short_options: str | None) -> dict[str, Any
     Raises:
         TyperException: If a text is wrong, or an entry is set twice.
     """
-    entries = {}
-    for text in settings:
-        key, equals, value = text.partition("=")
-        if not equals or not key.strip():
-            raise invalid("--set", f"{text}: must be KEY=VALUE, such as controller.gain=2")
-        if key.strip() in entries:
-            raise invalid("--set", f"{text}: an earlier one sets the same entry")
-        entries[key.strip()] = _parse_value(key.strip(), value)
+    texts = pairs("--set", settings, "KEY=VALUE, such as controller.gain=2")
+    entries = {key: _parse_value(key, value) for key, value in texts.items()}
     short_entries = {f"simulation.{name}": text for name, text in short_options.items() if text is not None}
     if repeated := [key for key in short_entries if key in entries]:
         raise invalid("--set", f"{repeated[0]}: --{repeated[0].rpartition('.')[2]} sets the same entry")

@@ -7,7 +7,9 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import xarray as xr
 
+from finger_pin.cancellation import CancelToken, Stop
 from finger_pin.description.loading import ScenarioLike
+from finger_pin.exceptions import Interrupted
 from finger_pin.observation.observer import Observer
 from finger_pin.observation.readings import ReadingsLike, read_readings, regular
 from finger_pin.progress import ProgressBar
@@ -23,6 +25,7 @@ def observe(
     period: float = 1e-3,
     level: float = 0.95,
     progress: bool = False,
+    stop: Stop | None = None,
 ) -> xr.Dataset | Observer:
     """Return what a finger did, from readings of its sensors; without readings an `Observer`, to be stepped.
 
@@ -45,12 +48,14 @@ def observe(
         period: Of the steps, s; readings may come later.
         level: Of the bands.
         progress: Whether to show a bar.
+        stop: Asked before every row; once it is true, the observation ends there, as after Ctrl-C.
 
     Returns:
         The Dataset of `Observer.result`, or the `Observer`.
 
     Raises:
         InputError: Naming the argument that is wrong.
+        Interrupted: After Ctrl-C or such a stop, with what was observed.
     """
     observer = Observer(scenario, uncertain=uncertain, sensors=sensors, forces=forces, period=period, level=level)
     if readings is None:
@@ -62,14 +67,20 @@ def observe(
     motors = {name: first[name] for name in observer.finger.actuators.names if np.isfinite(first.get(name, np.nan))}
     observer.start(motor_position=motors)
     bar = ProgressBar("s", float(times[rows[-1]] - times[rows[0]])) if progress else None
-    durations = np.diff(times[rows])
-    for k, duration in enumerate(durations.tolist(), 1):
-        observer.step(dict(zip(names, table[k].tolist(), strict=True)), duration)
-        if bar is not None and k % 100 == 0:
-            bar(observer.time)
+    with CancelToken(stop) as token:
+        for k, duration in enumerate(np.diff(times[rows]).tolist(), 1):
+            if token():
+                break
+            observer.step(dict(zip(names, table[k].tolist(), strict=True)), duration)
+            if bar is not None and k % 100 == 0:
+                bar(observer.time)
     if bar is not None:
         bar.close()
+    if token() and not observer.time:
+        raise Interrupted(float(times[rows[0]]))
     result = observer.result()
     result["time"] = ("time", result["time"].values + times[rows[0]], {"units": "s"})
     result.attrs["left_out"] = left_out + ([f"{backward} rows whose clock went back"] if backward else [])
+    if token():
+        raise Interrupted(float(result["time"][-1]), result)
     return result

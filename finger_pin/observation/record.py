@@ -14,6 +14,8 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.observation.estimate import Band, Estimate
 from finger_pin.typing import Array
 
+#: From this consistency on a model does not fit its readings.
+CONSISTENCY_LIMIT = 3.0
 # Rows that are kept at most; then every second one goes, and from there on every second estimate is kept.
 _MOST_ROWS = 100_000
 _BANDS = ("joint_position", "tendon_tension", "spool_tension", "fingertip_force")
@@ -88,7 +90,7 @@ class Record:
                 rows[:, 1],
                 {"units": "1", "long_name": "mean square of innovations over expected"},
             ),
-            "step_time": ("time", rows[:, 2], {"units": "s", "long_name": "processor time of a step"}),
+            "step_time": ("time", rows[:, 2], {"units": "s", "long_name": "wall time of a step"}),
         }
         place = 3
 

@@ -164,7 +164,11 @@ def test_an_unknown_bench_is_refused_with_the_list_of_benches_that_ship(capsys):
     )
 
 
-NEEDS = {"sweep": ["reversals", "--over", "controller.gain=1,2"], "identify": ["transmission"]}
+NEEDS = {
+    "sweep": ["reversals", "--over", "controller.gain=1,2"],
+    "identify": ["transmission"],
+    "observe": ["wound", "log.csv"],
+}
 
 
 @pytest.mark.parametrize("command", application.COMMANDS, ids=NAMES)

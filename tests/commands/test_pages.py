@@ -78,6 +78,7 @@ def shown(tmp_path_factory):
     """A folder to work in, with short versions of what ships, and the commands that were run there."""
     folder = tmp_path_factory.mktemp("pages")
     (folder / "urdf").symlink_to(ROOT / "urdf")
+    (folder / "log.csv").write_text("time,motor_position.servo,motor_current.servo\n0,0,0\n0.001,0,0\n0.002,0,0\n")
     shipped = folder / "shipped"
     for kind in ("fingers", "hands", "scenarios", "motors", "benches"):
         shutil.copytree(Path(tables.__file__).parent / kind, shipped / kind)

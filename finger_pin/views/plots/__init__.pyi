@@ -15,6 +15,7 @@ from .identification import plot_identification as plot_identification
 from .identification import plot_predictions as plot_predictions
 from .identification import plot_profiles as plot_profiles
 from .losses import plot_losses as plot_losses
+from .observation import plot_observed as plot_observed
 from .pareto import plot_pareto as plot_pareto
 from .servo import plot_servo as plot_servo
 from .sweep_metrics import plot_sweep as plot_sweep
