@@ -27,7 +27,6 @@ from .mechanism.finger import Hand as Hand
 from .mechanism.rows import Rows as Rows
 from .mechanism.urdf import to_urdf as to_urdf
 from .observation.observe import observe as observe
-from .observation.observer import Observer as Observer
 from .simulation.convergence import check_convergence as check_convergence
 from .simulation.frames import in_world as in_world
 from .simulation.netcdf import load as load

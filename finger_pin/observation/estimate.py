@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 from finger_pin.typing import Array
 
+#: Signals of which bands follow from the rest of the estimate.
+TENSIONS = ("tendon_tension", "spool_tension")
+
 
 class Band(NamedTuple):
     """A quantity and its band; arrays in SI."""
@@ -32,7 +35,7 @@ class Estimate:
         time: s, from the start.
         joint_position: theta, shape (n,), rad.
         tendon_tension: Tension that arrives behind all friction, shape (t,), N.
-        spool_tension: Tension at the canal's entrance, shape (t,), N.
+        spool_tension: Tension at the canal's entrance, shape (t,), N; None where no motor or winch pulls.
         fingertip_force: F at the tips of `Observer`'s ``forces``, shape (f, 3), N, base frame.
         touched: Whether a force presses on each of these, shape (f,).
         since: When it began to, shape (f,), s; NaN where none does.
@@ -47,7 +50,7 @@ class Estimate:
     time: float
     joint_position: Band
     tendon_tension: Band
-    spool_tension: Band
+    spool_tension: Band | None
     fingertip_force: Band
     touched: NDArray[np.bool_]
     since: Array

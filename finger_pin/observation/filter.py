@@ -46,7 +46,7 @@ class FilterArgs(NamedTuple):
         places: Numbers of the estimate that sensors read, shape (s,).
         readings: Of the sensors, NaN where there is none, shape (s,).
         variance: Of the readings, shape (s,).
-        innovations: Filled: of each reading that was taken, over its standard deviation; NaN of others, shape (s,).
+        innovations: Filled: of each reading that is there, over its standard deviation, shape (s,).
         gain: Memory, shape (N,).
         slopes: Derivatives of signals, by what ``derivatives`` are by, shape (k, n + u + 3 t + p).
         columns: Where in these the numbers of P stand, shape (N,).
@@ -183,9 +183,9 @@ def correct(address: int, _time: float) -> int:
             value = args.forces[args.force_at[place - size] // 3, args.force_at[place - size] % 3]
         total = args.covariance[place, place] + args.variance[s]
         innovation = args.readings[s] - value
-        if innovation * innovation > JUMP * JUMP * total:
-            continue
         args.innovations[s] = innovation / total**0.5
+        if abs(args.innovations[s]) > JUMP:
+            continue
         _correct_by(args, place, innovation, total)
         taken += 1
     if taken > 0:

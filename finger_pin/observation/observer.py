@@ -17,13 +17,14 @@ from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.coerce import as_packed
 from finger_pin.mechanism.finger import Finger
-from finger_pin.observation.estimate import Band, Estimate
-from finger_pin.observation.filter import FILTER_ARGS, FilterArgs, correct, predict, spread
+from finger_pin.observation.estimate import TENSIONS, Band, Estimate
+from finger_pin.observation.filter import FILTER_ARGS, JUMP, FilterArgs, correct, predict, spread
 from finger_pin.observation.noise import assumed_forces, hidden_tension, period_noise, start_covariance
 from finger_pin.observation.record import Record
 from finger_pin.observation.sensors import Sensors
 from finger_pin.observation.touch import TouchMonitor
 from finger_pin.observation.uncertainty import Uncertainty
+from finger_pin.simulation.frames import scene_metadata
 from finger_pin.simulation.simulator import Simulator
 from finger_pin.typing import Array
 
@@ -69,22 +70,23 @@ class Observer:
             raise InputError("level", "must be above 0 and below 1", level)
         # What surrounds the finger is not known to it.
         loaded = loaded.updated(environment={"objects": {}})
-        self.scenario, self.finger, self.period, self.level = loaded, Finger(loaded.finger), float(period), float(level)
-        finger = self.finger
+        finger = self.finger = Finger(loaded.finger)
+        self.scenario, self.period, self.level = loaded, float(period), float(level)
         self.uncertainty = Uncertainty.from_scenario(loaded, finger, uncertain)
         self._rest = Simulator.from_scenario(loaded, finger=finger).x
         self._periods = PeriodMap(
             finger, self._rest, self.uncertainty.varied, currents=True, rtol=_TOLERANCE, atol_scale=_TOLERANCE
         )
-        self._tips = finger.description.tree.tip_names or ("",)
+        self._tips = finger.description.tree.tip_names or (tuple(loaded.hand.fingers) if loaded.hand else ("",))
         self._force_at, self._force_deviation = assumed_forces(self._tips, forces)
         self._force_names = [self._tips[k // 3] for k in self._force_at[::3]]
         names = [f"fingertip_force.{self._tips[k // 3]}.{'xyz'[k % 3]}".replace("..", ".") for k in self._force_at]
         self.sensors = Sensors.from_finger(finger, names, sensors)
         self._quantile = float(scipy.stats.norm.ppf(0.5 + 0.5 * level))
-        # Of both signals that are watched.
-        self._hidden = np.tile(self._quantile * hidden_tension(finger, self.sensors), 2)
-        self._periods.watch(("tendon_tension", "spool_tension"))
+        watched = [name for name in TENSIONS if name in finger.signal_table]
+        self._hidden = np.tile(self._quantile * hidden_tension(finger, self.sensors), len(watched))
+        self._each = len(watched), len(finger.routing.tendons)
+        self._periods.watch(watched)
         size, held = len(self._periods.x), self._periods.derivatives.shape[1]
         self._columns = np.r_[
             np.arange(size), size + len(self._periods.inputs) + self._force_at, held - len(self.uncertainty.keys) : held
@@ -198,12 +200,12 @@ class Observer:
         taken = correct(self._block.address)
         innovations = self._filter.innovations.tolist()
         if taken < len(read):
-            skipped += [name for name, each in zip(read, innovations, strict=True) if each != each]
+            skipped += [name for name, each in zip(read, innovations, strict=True) if not abs(each) <= JUMP]
         self._count_missed(taken, len(read))
-        tension, _ = self._periods.watched()
+        tension = self._periods.watched()[0].copy()
         spread(self._block.address)
         self._touch.follow(innovations, self._filter.distance.tolist(), self.time, whole)
-        estimate = self._estimate(tension.copy(), tuple(skipped), failure)
+        estimate = self._estimate(tension, tuple(skipped), failure)
         self._record.add(estimate, time.perf_counter() - begin)
         return estimate
 
@@ -236,29 +238,26 @@ class Observer:
             # The estimate stays as it was, and is less certain.
             periods.restart(x, end)
             periods.forces[:] = force
-            at = np.arange(len(x))
-            self._covariance[at, at] += self._filter.noise[: len(x)]
+            np.einsum("ii->i", self._covariance)[: len(x)] += self._filter.noise[: len(x)]
         return failure
 
     def _count_missed(self, taken: int, read: int) -> None:
-        """Count periods without a reading that fits: what is read so often is so, and the estimate is lost."""
+        """Count periods without a reading that fits: after many the estimate is lost."""
         self._missed = 0 if taken or not read else self._missed + 1
         if self._missed > _MAX_MISSED:
-            at, self._missed = np.arange(len(self._periods.x)), 0
-            self._covariance[at, at] += _LOST**2 * self.finger.layout.scales() ** 2
+            self._missed, scale = 0, self.finger.layout.scales()
+            np.einsum("ii->i", self._covariance)[: len(scale)] += (_LOST * scale) ** 2
 
     def result(self) -> xr.Dataset:
-        """Return the Dataset of all steps since the start: estimates and bands over time.
-
-        Of every band the value has the name of a run's variable, and its ends ``_low`` and ``_high`` behind it.
+        """Return the Dataset of all steps since the start; ends of bands end in ``_low`` and ``_high``.
 
         Raises:
             InputError: If nothing has been observed.
         """
         attributes = {
-            "scenario": self.scenario.name,
-            "scenario_toml": to_toml(self.scenario),
-            "finger": self.finger.description.name,
+            "name": self.scenario.name,
+            "scenario": to_toml(self.scenario),
+            **scene_metadata(self.scenario),
             "level": self.level,
             "period": self.period,
             "uncertain": list(self.uncertainty.keys),
@@ -281,12 +280,12 @@ class Observer:
         size, joints, forces = len(periods.x), len(self.finger.routing.joints), len(self._force_at)
         deviation = np.sqrt(np.maximum(self._covariance.diagonal()[: size + forces], 0.0))
         half = np.maximum(quantile * np.sqrt(self._filter.signal_variance), self._hidden - tension)
-        cords = len(tension) // 2
+        arriving, *entering = zip(tension.reshape(self._each), half.reshape(self._each), strict=True)
         return Estimate(
             time=self.time,
             joint_position=Band.around(periods.x[:joints].copy(), quantile * deviation[:joints]),
-            tendon_tension=Band.around(tension[:cords], half[:cords], 0.0),
-            spool_tension=Band.around(tension[cords:], half[cords:], 0.0),
+            tendon_tension=Band.around(*arriving, 0.0),
+            spool_tension=Band.around(*entering[0], 0.0) if entering else None,
             fingertip_force=Band.around(self._force, quantile * deviation[size:].reshape(-1, 3)),
             touched=self._touch.touched,
             since=self._touch.since.copy(),

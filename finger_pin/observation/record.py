@@ -39,6 +39,7 @@ class Record:
         """
         routing = finger.routing
         self._coordinates = {"joint": list(routing.joints), "tendon": list(routing.tendons), "axis": [*"xyz"]}
+        self._bands = [name for name in _BANDS if name != "spool_tension" or name in finger.signal_table]
         self._dims: dict[str, tuple[str, ...]] = {
             "joint_position": ("joint",),
             "tendon_tension": ("tendon",),
@@ -61,7 +62,7 @@ class Record:
         self._seen += 1
         if (self._seen - 1) % self._stride:
             return
-        bands = [part.ravel() for name in _BANDS for part in getattr(estimate, name)]
+        bands = [part.ravel() for name in self._bands for part in getattr(estimate, name)]
         further = [estimate.touched, *(each.ravel() for each in estimate.observable.values())]
         row = np.concatenate([(estimate.time, estimate.consistency, duration), *bands, *further])
         if not self._count:
@@ -100,7 +101,7 @@ class Record:
             begin, place = place, place + int(np.prod(shape))
             return rows[:, begin:place].reshape(-1, *shape)
 
-        for name in _BANDS:
+        for name in self._bands:
             dims, (units, text) = self._dims[name], _QUANTITIES[name]
             for end, words in zip(
                 Band._fields, ("", ", lower end of its band", ", upper end of its band"), strict=True

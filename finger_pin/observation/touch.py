@@ -6,6 +6,8 @@ import numpy as np
 import scipy.stats
 from numpy.typing import NDArray
 
+from finger_pin.observation.filter import JUMP
+
 # F^T P^-1 F from which a force presses, and below which none does any more: what its noise alone passes once in a
 # thousand and in ten times; and how long it must be beyond, s.
 _TOUCH, _LET_GO = (float(scipy.stats.chi2.ppf(level, 3)) for level in (0.999, 0.9))
@@ -36,12 +38,13 @@ class TouchMonitor:
         """Go on by a period, s, to a time, s.
 
         Args:
-            innovations: Over their standard deviations, NaN for readings that were not taken.
+            innovations: Over their standard deviations, NaN for readings that are missing.
             distances: F^T P^-1 F of the force at each tip.
             time: s.
             h: s.
         """
-        squares = [each * each for each in innovations if each == each]
+        # Jumps that are not taken count as well, but one alone says little.
+        squares = [min(each * each, JUMP * JUMP) for each in innovations if each == each]
         if squares:
             self.consistency += min(1.0, h / _CONSISTENCY_TIME) * (sum(squares) / len(squares) - self.consistency)
         for k, distance in enumerate(distances):

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import textwrap
-import tomllib
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from finger_pin.description.loading import read_scenario
 from finger_pin.exceptions import InputError
 from finger_pin.observation.record import CONSISTENCY_LIMIT
-from finger_pin.simulation.frames import scene_metadata
 from finger_pin.simulation.netcdf import require_samples
 from finger_pin.views.shown_units import joints_by_unit
 from finger_pin.views.summary import table
@@ -56,16 +53,15 @@ def touches(result: xr.Dataset) -> list[Touch]:
     return spans
 
 
-def with_scene(result: xr.Dataset) -> xr.Dataset:
-    """Return an observation with the attributes by which results of runs tell hinges from slides.
+def require_observation(result: xr.Dataset) -> None:
+    """Refuse what is no observation.
 
     Raises:
-        InputError: If it is no observation.
+        InputError: If it is none.
     """
     require_samples(result)
-    if "consistency" not in result or "scenario_toml" not in result.attrs:
+    if "consistency" not in result:
         raise InputError("result.consistency", "is missing; give the result of fp.observe")
-    return result.assign_attrs(scene_metadata(read_scenario(tomllib.loads(result.attrs["scenario_toml"]))))
 
 
 def summarize_observed(result: xr.Dataset) -> str:
@@ -77,10 +73,10 @@ def summarize_observed(result: xr.Dataset) -> str:
     Raises:
         InputError: If it is none.
     """
-    result = with_scene(result)
+    require_observation(result)
     time, attributes = result["time"].values, result.attrs
     kept = f", every {attributes['stride']}th kept" if attributes["stride"] > 1 else ""
-    head = f"{attributes['scenario']}: {time[0]:.6g} s to {time[-1]:.6g} s observed"
+    head = f"{attributes['name']}: {time[0]:.6g} s to {time[-1]:.6g} s observed"
     kept = f", every {attributes['stride']}th kept" if attributes["stride"] > 1 else ""
     steps = f"steps of {1e3 * attributes['period']:g} ms, bands of {100.0 * attributes['level']:g} %"
     blocks = [[head, f"{len(time)} rows{kept}, {steps}"]]
@@ -90,8 +86,9 @@ def summarize_observed(result: xr.Dataset) -> str:
         blocks.append(_banded(title, rows))
     if result.sizes["tendon"]:
         for title, name in (("behind all friction", "tendon_tension"), ("at the canal's entrance", "spool_tension")):
-            rows = [_row(str(each), result.sel(tendon=each), name, 1.0, 3) for each in result["tendon"].values]
-            blocks.append(_banded(f"Tension {title}, N", rows))
+            if name in result:
+                rows = [_row(str(each), result.sel(tendon=each), name, 1.0, 3) for each in result["tendon"].values]
+                blocks.append(_banded(f"Tension {title}, N", rows))
     told = [_touches(result), _consistency(result), *_dropped(result), _speed(result)]
     return "\n\n".join("\n".join(block) for block in [*blocks, [line for each in told for line in _wrapped(each)]])
 

@@ -70,7 +70,7 @@ def test_options_say_what_is_uncertain_what_may_press_and_how_wide_bands_are(her
     observed = fp.load(here / "out" / "observed.nc")
     assert (observed.attrs["level"], observed.attrs["period"]) == (0.9, 0.002)
     assert observed.attrs["uncertain"] == COULOMB
-    finger = tomllib.loads(observed.attrs["scenario_toml"])["finger"]
+    finger = tomllib.loads(observed.attrs["scenario"])["finger"]
     assert finger["joints"]["mcp"]["spring"]["stiffness"] == 0.09
     # As long as the motor stands still nothing is known of a force but its size.
     half = 0.5 * (observed.fingertip_force_high - observed.fingertip_force_low)[0]
@@ -81,7 +81,7 @@ def test_a_fit_gives_estimates_and_intervals_of_the_finger_and_says_what_is_not_
     line = ["wound", "short.csv", "--fit", "identification.nc", "--output", "out", "--no-figures"]
     assert application.run("observe", line) == 0
     observed = fp.load(here / "out" / "observed.nc")
-    assert tomllib.loads(observed.attrs["scenario_toml"])["finger"]["tendon_friction"]["coulomb"] == 0.2
+    assert tomllib.loads(observed.attrs["scenario"])["finger"]["tendon_friction"]["coulomb"] == 0.2
     assert observed.attrs["uncertain"] == COULOMB
     assert "Left out: temperature, recordings.first.angle.offset of the fit\n" in capsys.readouterr().out
 

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from finger_pin.observation.record import CONSISTENCY_LIMIT
-from finger_pin.views.observation_text import observed_tips, touches, with_scene
+from finger_pin.views.observation_text import observed_tips, require_observation, touches
 from finger_pin.views.plots.lines import names, series, shade, times, trace
 from finger_pin.views.plots.panels import NO_TENDONS, cut_spikes, empty_panel, labelled, legend, sheet, stack, title
 from finger_pin.views.plots.style import BLACK, BLUE, VERMILLION, YELLOW, Width, limit_line, styled, thin
@@ -39,7 +39,7 @@ def plot_observed(
     Raises:
         InputError: If the result is none of an observation, or the run lacks a variable.
     """
-    result = with_scene(result)
+    require_observation(result)
     units, tendons, tips = shown_joints(result), names(result, "tendon"), observed_tips(result)
     if run is not None:
         run = run.sel(time=slice(float(result["time"][0]), float(result["time"][-1])))
@@ -56,15 +56,14 @@ def plot_observed(
         panels = stack(middle, [labelled(name, "N") for name in tendons])
         title(panels[0], "(b) tensions")
         for axes, name in zip(panels, tendons, strict=True):
-            for variable, (label, colour) in _TENSIONS.items():
+            tensions = [variable for variable in _TENSIONS if variable in result]
+            for variable, (label, colour) in ((each, _TENSIONS[each]) for each in tensions):
                 _draw_band(axes, result.sel(tendon=name), variable, label=label, color=colour)
                 if run is not None:
                     _draw_truth(axes, run[variable].sel(tendon=name))
             # Where a slack cord gets taut its band is wide for a moment.
             ends = [
-                result.sel(tendon=name)[f"{variable}{end}"].values
-                for variable in _TENSIONS
-                for end in ("_low", "_high")
+                result.sel(tendon=name)[f"{variable}{end}"].values for variable in tensions for end in ("_low", "_high")
             ]
             cut_spikes(axes, *ends)
         legend(middle, panels[0].get_legend_handles_labels()[0])
