@@ -91,6 +91,8 @@ def _spreads(scenario: Scenario, uncertain: Mapping[str, float] | xr.Dataset | N
             )
         width = (uncertain["upper"] - uncertain["lower"]).values / (2.0 * _HALF_WIDTH)
         names = [str(name) for name in uncertain["parameter"].values]
+        if tied := [name for name in names if "&" in name]:
+            raise InputError("uncertain", "has a parameter that ties several numbers; give a spread for each", tied[0])
         if open_ends := [name for name, each in zip(names, width, strict=True) if not np.isfinite(each)]:
             raise InputError("uncertain", "has an interval with an open end; give a spread in its place", open_ends[0])
         return dict(zip(names, width.tolist(), strict=True))
