@@ -13,7 +13,8 @@ y of a number i of the estimate, of variance r, corrects by
     k = P e_i / S with zeros for p,  S = P_ii + r,  (x, F) <- (x, F) + k (y - x_i),
 
 P <- (1 - k e_i^T) P (1 - k e_i^T)^T + r k k^T, which holds for any k. A reading beyond `JUMP` standard deviations is
-left out.
+left out. Where k (y - x_i) would lead farther than the model is about linear, as where a slack cord gets taut, k is
+made shorter.
 """
 
 from __future__ import annotations
@@ -46,6 +47,7 @@ class FilterArgs(NamedTuple):
         places: Numbers of the estimate that sensors read, shape (s,).
         readings: Of the sensors, NaN where there is none, shape (s,).
         variance: Of the readings, shape (s,).
+        reach: The longest correction of each number of the state, shape (n,).
         innovations: Filled: of each reading that is there, over its standard deviation, shape (s,).
         gain: Memory, shape (N,).
         slopes: Derivatives of signals, by what ``derivatives`` are by, shape (k, n + u + 3 t + p).
@@ -71,6 +73,7 @@ class FilterArgs(NamedTuple):
     places: Indices
     readings: Vector
     variance: Vector
+    reach: Vector
     innovations: Vector
     gain: Vector
     slopes: Matrix
@@ -148,18 +151,26 @@ def predict(address: int, end: float) -> int:
 def _correct_by(args: FilterArgs, place: int, innovation: float, total: float) -> None:
     """Correct the estimate by one reading."""
     p, gain, size, known = args.covariance, args.gain, args.state.size, args.state.size + args.force_at.size
-    wide = p.shape[0]
+    wide, share = p.shape[0], 1.0
     for i in range(wide):
         gain[i] = p[i, place]
+    for i in range(size):
+        step = abs(gain[i] / total * innovation)
+        if step * share > args.reach[i]:
+            share = args.reach[i] / step
+    # Of x and F alone, P loses share (2 - share) k k^T S, and share k k^T S of what it has with p.
+    within = share * (2.0 - share)
     for i in range(known):
         factor = gain[i] / total
         if i < size:
-            args.state[i] += factor * innovation
+            args.state[i] += share * factor * innovation
         else:
             at = args.force_at[i - size]
-            args.forces[at // 3, at % 3] += factor * innovation
-        for c in range(wide):
-            p[i, c] -= factor * gain[c]
+            args.forces[at // 3, at % 3] += share * factor * innovation
+        for c in range(known):
+            p[i, c] -= within * factor * gain[c]
+        for c in range(known, wide):
+            p[i, c] -= share * factor * gain[c]
     for i in range(known):
         for c in range(known, wide):
             p[c, i] = p[i, c]

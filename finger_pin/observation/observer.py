@@ -30,10 +30,10 @@ from finger_pin.typing import Array
 
 # Tolerance of the prediction: with 1e-4 it errs no less against what runs do, and takes twice as long.
 _TOLERANCE = 1e-3
+# The longest correction by a reading, of the scale of each number.
+_REACH = 0.05
 # After so many periods without a reading that fits the estimate is off by as much, of the scale of each number.
 _MAX_MISSED, _LOST = 50, 0.1
-# What an input that is missing has changed by, as a part of the last one.
-_MISSING_INPUT = 1.0
 
 
 class Observer:
@@ -118,6 +118,7 @@ class Observer:
             places=self.sensors.places(read),
             readings=np.full(len(read), np.nan),
             variance=np.array([self.sensors.deviation[name] for name in read], dtype=float) ** 2,
+            reach=_REACH * finger.layout.scales(),
             innovations=np.zeros(len(read)),
             gain=np.zeros(wide),
             slopes=periods.watched()[1],
@@ -216,9 +217,9 @@ class Observer:
             value, deviation = float(readings[name]), float(self.sensors.input_deviation[channel])
             last = self._last.get(name, value)
             if not np.isfinite(value):
-                # It was something like the last one.
+                # It was something between nothing and twice the last one.
                 missing.append(name)
-                value, last = (last, last + _MISSING_INPUT * abs(last)) if np.isfinite(last) else (0.0, 0.0)
+                value, last = (last, 2.0 * last) if np.isfinite(last) else (0.0, 0.0)
             inputs[channel] = 0.5 * (value + last)
             # Between two readings it was anything between them.
             variance[channel] = deviation**2 + (value - last) ** 2 / 12.0

@@ -40,6 +40,8 @@ def test_a_true_model_gives_angles_and_tensions_that_no_sensor_reads(run, observ
     assert (rms(observed.joint_position.values - run.joint_position.values[1:]) < 0.04).all()
     assert (rms(observed.tendon_tension.values - run.tendon_tension.values[1:]) < 0.8).all()
     assert (rms(observed.spool_tension.values - run.spool_tension.values[1:]) < 1.0).all()
+    # Also where the slack cord gets taut.
+    assert float(observed.spool_tension.sel(time=slice(0.3, 1.0)).max()) < 4.0
     assert not observed.touched.any()
     assert observed.consistency[-1] < 1.5
 
