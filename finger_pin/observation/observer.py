@@ -215,14 +215,14 @@ class Observer:
         inputs, variance, missing = self._periods.inputs, self._filter.input_variance, []
         for name, channel in self.sensors.inputs.items():
             value, deviation = float(readings[name]), float(self.sensors.input_deviation[channel])
-            last = self._last.get(name, value)
+            last = self._last.get(name, value if np.isfinite(value) else 0.0)
+            change = value - last
             if not np.isfinite(value):
                 # It was something between nothing and twice the last one.
                 missing.append(name)
-                value, last = (last, 2.0 * last) if np.isfinite(last) else (0.0, 0.0)
-            inputs[channel] = 0.5 * (value + last)
+                value, change = last, 2.0 * last
             # Between two readings it was anything between them.
-            variance[channel] = deviation**2 + (value - last) ** 2 / 12.0
+            inputs[channel], variance[channel] = 0.5 * (value + last), deviation**2 + change**2 / 12.0
             self._last[name] = value
         return missing
 

@@ -123,6 +123,14 @@ def test_bad_readings_are_skipped_and_counted(run):
     assert (rms(result.joint_position.values - truth) < 0.03).all()
 
 
+def test_a_missing_current_is_held_and_may_be_anything_to_twice_its_size(run):
+    observer = fp.observe("wound", sensors={"motor_current.servo": {"noise": 1e-3}})
+    for current in (0.25, 0.3, np.nan):
+        observer.step({"motor_position.servo": 0.0, "motor_current.servo": current})
+    assert observer._periods.inputs[0] == pytest.approx(0.3)
+    assert observer._filter.input_variance[0] == pytest.approx(1e-6 + 0.6**2 / 12.0)
+
+
 def test_motor_that_stands_still_tells_nothing_of_a_force(observed):
     assert (observed.fingertip_force_observable.sel(time=0.15, method="nearest") < 0.05).all()
     assert float(observed.fingertip_force_observable.sel(time=1.3, method="nearest").max()) > 0.2
