@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Collection
 from difflib import get_close_matches
 from functools import partial
 from importlib import import_module
@@ -40,17 +41,25 @@ def validate(
     output: Output = Path("results/validation"),
     random: Annotated[int, typer.Option(metavar="N", min=0, help="Check N random models instead.")] = 0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the first random model.")] = 0,
+    observer: Annotated[str, typer.Option(metavar="NAMES", help="Measure the observer: some cases, or all.")] = "",
+    seeds: Annotated[int, typer.Option(metavar="N", min=1, help="Fingers that --observer draws, of each case.")] = 20,
 ) -> int:
     """Compare the simulator with independent sources, and write a report.
 
     Closed forms, published experiments, Pinocchio, yourdfpy, MuJoCo, and the simulator against itself. With --random,
-    random models are computed in two ways each, nothing is written, and what fails is printed with its seed.
+    random models are computed in two ways each, nothing is written, and what fails is printed with its seed. With
+    --observer, a table says how far estimates of an observer are off, and what its bands hold, of random fingers.
 
     Exit codes: 0 every check passed, differs by a known amount, or was skipped because an optional package is not
     installed; 1 some failed, or the report cannot be written; 2 wrong options; 130 interrupted, nothing written.
     """
-    names = chosen(only)
+    names = chosen("--only", only, FAMILIES)
     shows_progress(quiet=False)
+    if observer:
+        from validation.observer import CASES, print_tables
+
+        print_tables(tuple(CASES) if observer == "all" else chosen("--observer", observer, CASES), seeds)
+        return 0
     if random:
         from validation import random_models
 
@@ -67,15 +76,15 @@ def validate(
     return 1 if whole.count(Verdict.FAIL) else 0
 
 
-def chosen(names: str) -> tuple[str, ...]:
-    """Parse names of families with commas between; keep their usual order."""
+def chosen(option: str, names: str, known: Collection[str]) -> tuple[str, ...]:
+    """Parse names with commas between; keep the usual order of those that are known."""
     wanted = [name.strip() for name in names.split(",")]
     for name in wanted:
-        if name not in FAMILIES:
-            near = get_close_matches(name, FAMILIES, n=1)
+        if name not in known:
+            near = get_close_matches(name, known, n=1)
             hint = f"; did you mean {near[0]}?" if near else ""
-            raise invalid("--only", f"{name}: no such family; there are {', '.join(FAMILIES)}{hint}")
-    return tuple(name for name in FAMILIES if name in wanted)
+            raise invalid(option, f"{name}: must be some of {', '.join(known)}{hint}")
+    return tuple(name for name in known if name in wanted)
 
 
 def measured(names: tuple[str, ...]) -> tuple[Family, ...]:

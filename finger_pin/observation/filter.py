@@ -47,6 +47,7 @@ class FilterArgs(NamedTuple):
         places: Numbers of the estimate that sensors read, shape (s,).
         readings: Of the sensors, NaN where there is none, shape (s,).
         variance: Of the readings, shape (s,).
+        levels: Filled by ``limit``: how far each number of the state may be from zero, shape (n,).
         reach: The longest correction of each number of the state, shape (n,).
         innovations: Filled: of each reading that is there, over its standard deviation, shape (s,).
         gain: Memory, shape (N,).
@@ -73,6 +74,7 @@ class FilterArgs(NamedTuple):
     places: Indices
     readings: Vector
     variance: Vector
+    levels: Vector
     reach: Vector
     innovations: Vector
     gain: Vector
@@ -178,6 +180,19 @@ def _correct_by(args: FilterArgs, place: int, innovation: float, total: float) -
             p[c, i] = p[i, c] = 0.5 * (p[i, c] + p[c, i])
 
 
+@njit_inline
+def _limit(args: FilterArgs) -> None:
+    """Bring bristles, and their deviations, back to their levels, beyond which no derivative holds."""
+    call_at(args.limit, args.period, 0.0)
+    p = args.covariance
+    for i in range(args.state.size):
+        if p[i, i] > args.levels[i] * args.levels[i]:
+            share = args.levels[i] / p[i, i] ** 0.5
+            for c in range(p.shape[0]):
+                p[i, c] *= share
+                p[c, i] *= share
+
+
 @CompiledFunction
 def correct(address: int, _time: float) -> int:
     """Correct the estimate of the `FilterArgs` at an address by its readings, one after the other; return how many."""
@@ -199,8 +214,7 @@ def correct(address: int, _time: float) -> int:
             continue
         _correct_by(args, place, innovation, total)
         taken += 1
-    if taken > 0:
-        call_at(args.limit, args.period, 0.0)
+    _limit(args)
     return taken
 
 

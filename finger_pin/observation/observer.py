@@ -28,10 +28,8 @@ from finger_pin.simulation.frames import scene_metadata
 from finger_pin.simulation.simulator import Simulator
 from finger_pin.typing import Array
 
-# Tolerance of the prediction: with 1e-4 it errs no less against what runs do, and takes twice as long.
-_TOLERANCE = 1e-3
-# The longest correction by a reading, of the scale of each number.
-_REACH = 0.05
+# The longest correction by a reading, of the scale of each number; tolerance of the prediction: 1e-4 is no truer.
+_REACH, _TOLERANCE = 0.05, 1e-3
 # After so many periods without a reading that fits the estimate is off by as much, of the scale of each number.
 _MAX_MISSED, _LOST = 50, 0.1
 
@@ -118,6 +116,7 @@ class Observer:
             places=self.sensors.places(read),
             readings=np.full(len(read), np.nan),
             variance=np.array([self.sensors.deviation[name] for name in read], dtype=float) ** 2,
+            levels=periods.limit_bristles(),
             reach=_REACH * finger.layout.scales(),
             innovations=np.zeros(len(read)),
             gain=np.zeros(wide),
@@ -192,11 +191,13 @@ class Observer:
         # Over a gap the model goes on by itself.
         pieces = max(1, round(whole / self.period))
         h = whole / pieces
-        if self._bound != (read, h):
+        if self._bound[0] != read or abs(self._bound[1] - h) > 1e-9 * h:
             self._bind(read, h)
-        skipped, failure = self._hold(readings), ""
-        for _ in range(pieces):
+        skipped, failure = list[str](), ""
+        for piece in range(pieces):
+            skipped = self._hold(readings, (piece + 0.5) / pieces, 1.0 / pieces)
             failure = self._predict(h) or failure
+        self._last |= {name: float(readings[name]) for name in self.sensors.inputs if readings[name] == readings[name]}
         self._filter.readings[:] = [readings[name] for name in read]
         taken = correct(self._block.address)
         innovations = self._filter.innovations.tolist()
@@ -210,20 +211,19 @@ class Observer:
         self._record.add(estimate, time.perf_counter() - begin)
         return estimate
 
-    def _hold(self, readings: Mapping[str, float]) -> list[str]:
-        """Hold the mean of the last two readings of every input over a period; return those that are missing."""
+    def _hold(self, readings: Mapping[str, float], place: float, share: float) -> list[str]:
+        """Hold every input between its last two readings, at a place in a part of that time; return what is missing."""
         inputs, variance, missing = self._periods.inputs, self._filter.input_variance, []
         for name, channel in self.sensors.inputs.items():
             value, deviation = float(readings[name]), float(self.sensors.input_deviation[channel])
             last = self._last.get(name, value if np.isfinite(value) else 0.0)
-            change = value - last
+            inputs[channel], change = last + place * (value - last), share * (value - last)
             if not np.isfinite(value):
                 # It was something between nothing and twice the last one.
                 missing.append(name)
-                value, change = last, 2.0 * last
+                inputs[channel], change = last, 2.0 * last
             # Between two readings it was anything between them.
-            inputs[channel], variance[channel] = 0.5 * (value + last), deviation**2 + change**2 / 12.0
-            self._last[name] = value
+            variance[channel] = deviation**2 + change**2 / 12.0
         return missing
 
     def _predict(self, h: float) -> str:

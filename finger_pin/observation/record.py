@@ -99,7 +99,7 @@ class Record:
             nonlocal place
             shape = [sizes[name] for name in dims]
             begin, place = place, place + int(np.prod(shape))
-            return rows[:, begin:place].reshape(-1, *shape)
+            return rows[:, begin:place].reshape(len(rows), *shape)
 
         for name in self._bands:
             dims, (units, text) = self._dims[name], _QUANTITIES[name]

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from finger_pin.observation.filter import JUMP
 
 # F^T P^-1 F from which a force presses, and below which none does any more: what its noise alone passes once in a
-# thousand and in ten times; and how long it must be beyond, s.
-_TOUCH, _LET_GO = (float(scipy.stats.chi2.ppf(level, 3)) for level in (0.999, 0.9))
+# thousand and in two times; and how long it must be beyond, s.
+_TOUCH, _LET_GO = (float(scipy.stats.chi2.ppf(level, 3)) for level in (0.999, 0.5))
 _TOUCH_TIME = 0.01
 # Time over which innovations are averaged, s.
 _CONSISTENCY_TIME = 0.2

@@ -50,6 +50,8 @@ SHORTER = {
     r"(compare_laws\.py).*": r"\1 transmission",
     # It fits for minutes.
     r"(servo_models\.py).*": r"\1 --only M1 --generations 0",
+    # What it prints has a test of its own.
+    r"(validate\.py) --observer.*": r"\1 --help",
     # Its stages have tests of their own, and it measures for minutes.
     r"(benchmark\.py).*": r"\1 --help",
     # They train for minutes, with a library that tests do without.

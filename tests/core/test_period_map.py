@@ -144,7 +144,7 @@ def test_bristles_are_limited_to_their_levels(wound):
     bent[places] = 5.0
     periods = PeriodMap(finger, bent)
     levels = periods.limit_bristles()
-    assert np.isfinite(levels[places]).all() and np.isnan(levels[: 2 * finger.mechanism.coordinates]).all()
+    assert np.isfinite(levels[places]).all() and np.isinf(levels[: 2 * finger.mechanism.coordinates]).all()
     np.testing.assert_array_equal(periods.x[places], levels[places])
     # A level of (9) with its load and speed: what the law itself says.
     expected = finger.evaluate(bent, np.zeros(1)).rows["gearboxes"].rows

@@ -100,8 +100,15 @@ def test_a_filter_step_is_that_of_schmidt(run):
     row = np.arange(n + 3 + p) == filters.places[0]
     gain = predicted[:, row][:, 0] / (predicted[row, row][0] + filters.variance[0])
     gain[n + 3 :] = 0.0
+    # No correction is longer than it may be.
+    innovation = filters.innovations[0] * np.sqrt(predicted[row, row][0] + filters.variance[0])
+    gain *= min(1.0, np.min(filters.reach / np.abs(gain[:n] * innovation)))
     rest = np.eye(n + 3 + p) - np.outer(gain, row)
     expected = rest @ predicted @ rest.T + filters.variance[0] * np.outer(gain, gain)
+    # Bristles are no less certain than their levels.
+    kept = np.ones(len(expected))
+    kept[:n] = np.minimum(1.0, filters.levels / np.sqrt(expected.diagonal()[:n]))
+    expected *= np.outer(kept, kept)
     scale = np.sqrt(np.outer(expected.diagonal(), expected.diagonal()))
     assert np.abs((observer._covariance - expected) / scale).max() < 1e-4
     np.testing.assert_array_equal(observer._covariance[n + 3 :, n + 3 :], np.diag(observer.uncertainty.deviations**2))
@@ -129,6 +136,25 @@ def test_a_missing_current_is_held_and_may_be_anything_to_twice_its_size(run):
         observer.step({"motor_position.servo": 0.0, "motor_current.servo": current})
     assert observer._periods.inputs[0] == pytest.approx(0.3)
     assert observer._filter.input_variance[0] == pytest.approx(1e-6 + 0.6**2 / 12.0)
+
+
+def test_an_observer_without_forces_and_one_of_rare_readings_tell_angles(run):
+    times, columns = readings_of(run)
+    rare = times[::10], {name: values[::10] for name, values in columns.items()}
+    result = fp.observe("wound", rare, forces=())
+    assert result.sizes.get("fingertip", 0) == 0
+    truth = run.joint_position.sel(time=result.time, method="nearest").values
+    assert (rms(result.joint_position.values - truth) < 0.04).all()
+
+
+def test_deviations_of_bristles_stay_within_their_levels(run):
+    observer, (_, columns) = fp.observe("wound"), readings_of(run)
+    for k in range(1, 300):
+        observer.step({name: values[k] for name, values in columns.items()})
+    levels = observer._periods.limit_bristles()
+    bent = np.isfinite(levels)
+    assert bent.any()
+    assert (np.sqrt(observer._covariance.diagonal()[: len(levels)])[bent] <= levels[bent] * (1.0 + 1e-6)).all()
 
 
 def test_motor_that_stands_still_tells_nothing_of_a_force(observed):

@@ -60,6 +60,7 @@ class PeriodArgs(NamedTuple):
         watched: Filled by `fill_watched`: these signals at the state, shape (k,).
         slopes: Filled by it: their derivatives by the state and what is held, shape (k, n + m).
         bristles: Places of bristles in the state, their rows, and columns of the rows' levels, shape (b, 3).
+        levels: Filled by `limit_bristles`: their levels, infinite for all other numbers of the state, shape (n,).
     """
 
     advance: int
@@ -77,6 +78,7 @@ class PeriodArgs(NamedTuple):
     watched: Vector
     slopes: Matrix
     bristles: IndexTable
+    levels: Vector
 
 
 PERIOD_ARGS = StructType(PeriodArgs)
@@ -230,7 +232,7 @@ def limit_bristles(address: int, _time: float) -> int:
     _evaluate(period.plain, integration.x, False)
     for b in range(period.bristles.shape[0]):
         place, level = period.bristles[b, 0], rows[period.bristles[b, 2], period.bristles[b, 1]]
-        integration.x[place] = min(max(integration.x[place], -level), level)
+        integration.x[place], period.levels[place] = min(max(integration.x[place], -level), level), level
     return 1
 
 

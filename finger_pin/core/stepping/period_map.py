@@ -125,6 +125,7 @@ class PeriodMap:
             watched=np.zeros(0),
             slopes=np.zeros((0, size + held)),
             bristles=self._bristles(),
+            levels=np.full(size, np.inf),
         )
         self._bind()
         self.advance_address, self.limit_address = advance_period.address, limit_bristles.address
@@ -183,12 +184,10 @@ class PeriodMap:
         """Bring bristles of the state back to their levels, which steady sliding does not pass.
 
         Returns:
-            These levels, shape (n,), N or N m; NaN for all other numbers of the state.
+            These levels, shape (n,), N or N m, overwritten at the next call; infinite for all else in the state.
         """
         limit_bristles(self.address)
-        levels, (places, rows, columns) = np.full(len(self.x), np.nan), self._args.bristles.T
-        levels[places] = self._models[0].model.work.rows[columns, rows]
-        return levels
+        return self._args.levels
 
     def watch(self, names: Sequence[str]) -> None:
         """Prepare `watched` for signals that are sums of forces and inputs of rows with fixed weights, as tensions are.
