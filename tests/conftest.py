@@ -1,6 +1,8 @@
 """Shared fixtures: the paper's finger, networks made on the spot, and the few expensive runs."""
 
 import importlib
+import os
+import pkgutil
 import shutil
 import sys
 from types import SimpleNamespace
@@ -8,6 +10,8 @@ from types import SimpleNamespace
 import pytest
 
 import finger_pin as fp
+from finger_pin import core
+from finger_pin.core.jit import CompiledFunction
 from finger_pin.description.simulation_settings import METHODS
 
 
@@ -17,6 +21,23 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if "browser" in item.fixturenames:
             item.add_marker(pytest.mark.slow)
+
+
+def pytest_collection_finish(session):
+    """Compile what the whole suite needs in its processes at once: every second one begins at the end.
+
+    Else one would compile and the others wait, as they need the same.
+    """
+    worker = os.environ.get("PYTEST_XDIST_WORKER")
+    if worker is None or len(session.items) < 1000:
+        return
+    functions = []
+    for found in pkgutil.walk_packages(core.__path__, f"{core.__name__}."):
+        values = vars(importlib.import_module(found.name)).values()
+        functions += [each for each in values if isinstance(each, CompiledFunction) and each.__module__ == found.name]
+    for function in functions[:: -1 if int(worker[2:]) % 2 else 1]:
+        if not function.kept:
+            function.compile()
 
 
 @pytest.fixture(scope="session")
@@ -66,8 +87,8 @@ def fig6_progress():
 
 @pytest.fixture(scope="session")
 def fig6_runs(fig6_progress):
-    """The first 0.05 s of reversals by every method at the default tolerances."""
-    scenarios = {each: {"simulation.duration": 0.05, "simulation.method": each} for each in METHODS}
+    """The first 0.03 s of reversals by every method at the default tolerances."""
+    scenarios = {each: {"simulation.duration": 0.03, "simulation.method": each} for each in METHODS}
     return {
         method: fp.simulate(fp.load_scenario("reversals", changed), progress=fig6_progress[method].append)
         for method, changed in scenarios.items()

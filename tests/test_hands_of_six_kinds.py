@@ -136,8 +136,10 @@ def hand(request, tmp_path_factory):
     result = fp.simulate(scenario)
     fp.save(result, folder / "r.nc")
     (folder / "log.csv").write_text("time,inputs.m\n0,0\n0.001,0\n")
-    built = fp.Finger(description)
-    return SimpleNamespace(folder=folder, description=description, scenario=scenario, result=result, built=built)
+    built, run = fp.Finger(description), fp.studies.Run(scenario)
+    return SimpleNamespace(
+        folder=folder, description=description, scenario=scenario, result=result, built=built, run=run
+    )
 
 
 def argument(name, door, hand):
@@ -218,7 +220,7 @@ def test_every_public_function_answers_or_says_in_one_line_why_not(hand, name):
 @pytest.mark.parametrize("name", fp.studies.METRICS)
 def test_every_metric_is_a_number_or_says_in_one_line_why_not(hand, name):
     try:
-        value = fp.studies.METRICS[name].measure(fp.studies.Run(hand.scenario))
+        value = fp.studies.METRICS[name].measure(hand.run)
     except InputError as error:
         assert "\n" not in str(error)
     else:

@@ -1,7 +1,6 @@
 """Resets of an episode: what they cost, and where they start."""
 
 import numpy as np
-import pytest
 
 import finger_pin as fp
 from finger_pin.control import build
@@ -47,9 +46,9 @@ def is_free(world, position):
     return True
 
 
-@pytest.mark.parametrize("steps", [8, 32])
-def test_an_episode_starts_at_the_nearest_free_posture_towards_the_reference_where_draws_overlap(steps, monkeypatch):
+def test_an_episode_starts_at_the_nearest_free_posture_towards_the_reference_where_draws_overlap(monkeypatch):
     """Both fingers are bent through the ball between them."""
+    steps = 8
     monkeypatch.setattr("finger_pin.learning.world._WAY_STEPS", steps)
     scenario = fp.load_scenario("grasp", {f"simulation.{name}": value for name, value in COARSE.items()})
     reference = Environment(scenario, reward=nothing)._worlds.worlds[0].simulator.loop.reference.at(0.0).position

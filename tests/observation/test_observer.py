@@ -110,7 +110,7 @@ def test_a_filter_step_is_that_of_schmidt(run):
     kept[:n] = np.minimum(1.0, filters.levels / np.sqrt(expected.diagonal()[:n]))
     expected *= np.outer(kept, kept)
     scale = np.sqrt(np.outer(expected.diagonal(), expected.diagonal()))
-    assert np.abs((observer._covariance - expected) / scale).max() < 1e-4
+    assert np.abs((observer._covariance - expected) / scale).max() < 2e-3
     np.testing.assert_array_equal(observer._covariance[n + 3 :, n + 3 :], np.diag(observer.uncertainty.deviations**2))
 
 

@@ -80,7 +80,9 @@ def test_every_number_that_ships_makes_what_reading_it_anew_does(name):
         if ALIKE.match(f"{name}.{key}"):
             continue
         family = ParametrisedScenario(scenario, [key])
-        read_alike(name, key, whole(value), family)
+        # Keys of a finger of a hand are those of a finger.
+        if not key.startswith("hand.fingers."):
+            read_alike(name, key, whole(value), family)
         if read_alike(name, key, changed(value), family):
             together[key] = changed(value)
     assert len(together) > 20

@@ -32,7 +32,7 @@ from finger_pin.files import write_text
 #: Rooms and modules that hold compiled functions, or what these take for constants.
 COMPILED_MODULES = (
     "finger_pin.core",
-    "finger_pin.description.tree_parts",
+    "finger_pin.description.tree_couplings",
     "finger_pin.exchange.mujoco_friction",
     "finger_pin.laws",
     "finger_pin.mechanism.gaps",
