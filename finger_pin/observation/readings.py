@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from finger_pin.description.recordings.columns import SignalFile, Table
 from finger_pin.description.recordings.csv_files import read_columns
-from finger_pin.description.validation import validate
+from finger_pin.description.validation import choices, validate
 from finger_pin.exceptions import InputError
 from finger_pin.files import expand
 from finger_pin.observation.sensors import Sensors
@@ -72,6 +72,10 @@ def read_readings(source: ReadingsLike, sensors: Sensors) -> Readings:
     timed = np.isfinite(times)
     if not timed.all():
         left_out.append(f"{np.count_nonzero(~timed)} rows without a time")
+    if not columns:
+        raise InputError(
+            "readings", f"must have a column that a sensor of the finger has: {choices('', known)}", left_out
+        )
     sensors.check(columns)
     if np.count_nonzero(timed) < 2:
         raise InputError("readings", "must have two rows with a time at least", len(times))

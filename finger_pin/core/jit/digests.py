@@ -38,6 +38,7 @@ COMPILED_MODULES = (
     "finger_pin.mechanism.gaps",
     "finger_pin.mechanism.spans",
     "finger_pin.mujoco",
+    "finger_pin.observation.filter",
     "finger_pin.references",
 )
 # Their names tell what they have, as their versions are part of the digest.
