@@ -47,7 +47,7 @@ class FilterArgs(NamedTuple):
         places: Numbers of the estimate that sensors read, shape (s,).
         readings: Of the sensors, NaN where there is none, shape (s,).
         variance: Of the readings, shape (s,).
-        levels: Filled by ``limit``: how far each number of the state may be from zero, shape (n,).
+        levels: The largest deviation of each number of the state; of bristles filled by ``limit``, shape (n,).
         reach: The longest correction of each number of the state, shape (n,).
         innovations: Filled: of each reading that is there, over its standard deviation, shape (s,).
         gain: Memory, shape (N,).
@@ -182,7 +182,7 @@ def _correct_by(args: FilterArgs, place: int, innovation: float, total: float) -
 
 @njit_inline
 def _limit(args: FilterArgs) -> None:
-    """Bring bristles, and their deviations, back to their levels, beyond which no derivative holds."""
+    """Bring bristles back to their levels, and deviations to theirs, beyond which no derivative holds."""
     call_at(args.limit, args.period, 0.0)
     p = args.covariance
     for i in range(args.state.size):

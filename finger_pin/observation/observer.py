@@ -90,6 +90,8 @@ class Observer:
             np.arange(size), size + len(self._periods.inputs) + self._force_at, held - len(self.uncertainty.keys) : held
         ]
         self._covariance = np.zeros((len(self._columns), len(self._columns)))
+        levels = self._periods.limit_bristles()
+        self._levels = np.minimum(levels, finger.layout.scales(), out=levels)
         self._bind((), self.period)
         self.start()
 
@@ -116,7 +118,7 @@ class Observer:
             places=self.sensors.places(read),
             readings=np.full(len(read), np.nan),
             variance=np.array([self.sensors.deviation[name] for name in read], dtype=float) ** 2,
-            levels=periods.limit_bristles(),
+            levels=self._levels,
             reach=_REACH * finger.layout.scales(),
             innovations=np.zeros(len(read)),
             gain=np.zeros(wide),
@@ -188,8 +190,7 @@ class Observer:
         read = tuple(name for name in readings if name in self.sensors.states)
         if len(read) + len(self.sensors.inputs) != len(readings) or not self.sensors.inputs.keys() <= readings.keys():
             self.sensors.check(readings)
-        # Over a gap the model goes on by itself.
-        pieces = max(1, round(whole / self.period))
+        pieces = max(1, round(whole / self.period))  # over a gap the model goes on by itself
         h = whole / pieces
         if self._bound[0] != read or abs(self._bound[1] - h) > 1e-9 * h:
             self._bind(read, h)
@@ -201,8 +202,7 @@ class Observer:
         self._filter.readings[:] = [readings[name] for name in read]
         taken = correct(self._block.address)
         innovations = self._filter.innovations.tolist()
-        if taken < len(read):
-            skipped += [name for name, each in zip(read, innovations, strict=True) if not abs(each) <= JUMP]
+        skipped += [name for name, each in zip(read, innovations, strict=True) if not abs(each) <= JUMP]
         self._count_missed(taken, len(read))
         tension = self._periods.watched()[0].copy()
         spread(self._block.address)
