@@ -198,7 +198,7 @@ class Observer:
         for piece in range(pieces):
             skipped = self._hold(readings, (piece + 0.5) / pieces, 1.0 / pieces)
             failure = self._predict(h) or failure
-        self._last |= {name: float(readings[name]) for name in self.sensors.inputs if readings[name] == readings[name]}
+        self._last |= {name: float(readings[name]) for name in self.sensors.inputs if np.isfinite(readings[name])}
         self._filter.readings[:] = [readings[name] for name in read]
         taken = correct(self._block.address)
         innovations = self._filter.innovations.tolist()

@@ -14,6 +14,7 @@ from finger_pin.description.scenario import Scenario
 from finger_pin.description.tables import match_paths, split
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
+from finger_pin.simulation.sensitivity import make_variations
 from finger_pin.typing import Array
 
 # Default spreads by the last names of keys: frictions, springs and stiffnesses; radii.
@@ -22,8 +23,6 @@ _ELASTIC = ("spring.stiffness", "passive_tendon.stiffness", "tendon_rigidity", "
 _DEFAULTS = {**dict.fromkeys((*_FRICTIONS, *_ELASTIC), 0.1), **dict.fromkeys(("radius", "spool_radius"), 0.02)}
 # Parts of a finger whose numbers of these names are no part of its transmission.
 _APART = ("finger.stroke_limiter", "finger.contact", "finger.tree.bodies")
-# Of its size, the change of a number for derivatives.
-_CHANGE = 1e-6
 # Half widths of 95 % intervals, in standard deviations.
 _HALF_WIDTH = 1.96
 
@@ -48,7 +47,7 @@ class Uncertainty:
     def from_scenario(
         cls, scenario: Scenario, finger: Finger, uncertain: Mapping[str, float] | xr.Dataset | None
     ) -> Uncertainty:
-        """Read what is uncertain.
+        """Read the numbers that are uncertain.
 
         Args:
             scenario: The scenario.
@@ -64,11 +63,10 @@ class Uncertainty:
         for key, spread in spreads.items():
             family = ParametrisedScenario(scenario, (key,))
             value = _number(key, family.values[0])
-            # Where a number is nothing, its deviation tells its size.
             deviation = spread if isinstance(uncertain, xr.Dataset) else spread * abs(value)
-            change = _CHANGE * (abs(value) or deviation)
             try:
-                changed = family.with_values([value + change])
+                # Where a number is nothing, its deviation tells its size.
+                scenarios, changes = make_variations([value], [abs(value) or deviation], family.with_values)
             except InputError:
                 if uncertain is not None:
                     raise
@@ -77,7 +75,7 @@ class Uncertainty:
             keys.append(key)
             values.append(value)
             deviations.append(deviation)
-            varied.append((Finger(changed.finger), change))
+            varied.append((Finger(scenarios[0].finger), float(changes[0])))
         return cls(tuple(keys), np.array(values), np.array(deviations), varied)
 
 

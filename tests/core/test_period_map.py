@@ -154,6 +154,16 @@ def test_bristles_are_limited_to_their_levels(wound):
     )
 
 
+def test_friction_without_bristles_limits_no_number_of_the_state():
+    finger = fp.Finger(fp.load_scenario("wound", {"finger.joint_friction.law": "coulomb"}).finger)
+    width = finger.mechanism.coordinates
+    x = finger.rest_state([0.1, 0.1, 0.1], [3.0, 2.0, 1.0])
+    periods = PeriodMap(finger, x)
+    levels = periods.limit_bristles()
+    np.testing.assert_array_equal(periods.x[: 2 * width], x[: 2 * width])
+    assert np.isinf(levels[: 2 * width]).all() and np.isfinite(levels[2 * width :]).all()
+
+
 def test_a_motor_fed_with_a_current_turns_by_its_torque_constant(wound):
     _, finger, _x, _ = wound
     slack = finger.rest_state([0.5, 0.5, 0.5])

@@ -132,7 +132,7 @@ def test_bad_readings_are_skipped_and_counted(run):
 
 def test_a_missing_current_is_held_and_may_be_anything_to_twice_its_size(run):
     observer = fp.observe("wound", sensors={"motor_current.servo": {"noise": 1e-3}})
-    for current in (0.25, 0.3, np.nan):
+    for current in (0.25, 0.3, np.inf, np.nan):
         observer.step({"motor_position.servo": 0.0, "motor_current.servo": current})
     assert observer._periods.inputs[0] == pytest.approx(0.3)
     assert observer._filter.input_variance[0] == pytest.approx(1e-6 + 0.6**2 / 12.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ from finger_pin.core.tables.mechanism_parameters import Parameters, compile_mech
 from finger_pin.exceptions import InputError
 from finger_pin.laws.motor import MOTOR
 from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.rows import Rows
 from finger_pin.typing import Array
 
 # Changes for differences: of the scale of a state, of an input in N or V, of a force in N.
@@ -83,13 +84,13 @@ class PeriodMap:
         """
         self.finger, mechanism = finger, finger.mechanism
         structure, parameters = compile_mechanism(mechanism)
+        self._structure = structure
         if mechanism.moved or len(structure.charts):
             raise InputError("finger", "must be at rest as a whole, without free bodies", finger.description.name)
         control = held_control(mechanism.channels, mechanism.coordinates)
         laws, forces = [table.law for table in mechanism.rows], np.zeros((len(structure.tip_body), 3))
         counts = mechanism.coordinates, len(structure.state), len(structure.state_row), mechanism.channels
-        places = [np.arange(count) for count in (*counts, 0, len(forces))]
-        whole = Island(*places)
+        whole = Island(*(np.arange(count) for count in (*counts, 0, len(forces))))
         tableau, memory = TABLEAUS[method](), np.zeros(len(core.StepMemory._fields))
         # All models read the same inputs and forces.
         loaded = bool(len(forces))
@@ -131,31 +132,31 @@ class PeriodMap:
         self.advance_address, self.limit_address = advance_period.address, limit_bristles.address
         self.restart(start)
 
-    def _row_range(self, group: str) -> slice:
-        """Return the rows of a table among all; none where the finger lacks it."""
-        counts = {table.group: table.count for table in self.finger.mechanism.rows}
-        begin = sum(list(counts.values())[: [*counts, group].index(group)])
-        return slice(begin, begin + counts.get(group, 0))
+    def _rows(self) -> Iterator[tuple[Rows, NDArray[np.int64]]]:
+        """Yield the tables of the mechanism, each with the places of its rows among all."""
+        groups = self._structure.groups
+        for table, begin, end in zip(self.finger.mechanism.rows, groups.first, groups.end, strict=True):
+            yield table, np.arange(begin, end)
 
     def _fed(self, parameters: Parameters, currents: bool) -> Parameters:
         """Return a copy of parameters, with motors that take currents as they are."""
-        numbers, motors = copied(parameters), self._row_range("motors")
-        for name, value in _CURRENT_DRIVE.items() if currents else ():
-            numbers.laws[MOTOR.parameters.index(name), motors] = value
-        if currents:
-            numbers.laws[_GAIN, motors] = numbers.laws[MOTOR.parameters.index("torque_constant"), motors]
+        numbers = copied(parameters)
+        for table, rows in self._rows():
+            if currents and table.group == "motors":
+                for name, value in _CURRENT_DRIVE.items():
+                    numbers.laws[MOTOR.parameters.index(name), rows] = value
+                numbers.laws[_GAIN, rows] = numbers.laws[MOTOR.parameters.index("torque_constant"), rows]
         return numbers
 
     def _bristles(self) -> NDArray[np.int64]:
         """Return places of bristles in the state, their rows, and columns of the rows' levels, shape (b, 3)."""
-        structure, entries, begin = self._integrator.structure, [], 0
-        for table in self.finger.mechanism.rows:
-            if "level" in table.law.signals and table.law.arms == 1:
+        entries = []
+        for table, rows in self._rows():
+            # A law of friction without bristles has a level and no state.
+            if "level" in table.law.signals and table.law.arms == 1 and table.law.scale is not None:
                 column = ROW.signals + table.law.signals.index("level")
-                rows = np.arange(begin, begin + table.count)
-                places = 2 * self.finger.mechanism.coordinates + structure.state[rows]
+                places = 2 * self.finger.mechanism.coordinates + self._structure.state[rows]
                 entries += [(place, row, column) for place, row in zip(places, rows, strict=True)]
-            begin += table.count
         return np.array(entries, dtype=np.int64).reshape(-1, 3)
 
     @property
