@@ -44,8 +44,10 @@ def states(loop: ClosedLoop, rng: np.random.Generator, count: int) -> Array:
 
 
 def inputs(loop: ClosedLoop, rng: np.random.Generator) -> Array:
-    """Return inputs of a mechanism: tensions that pull, and anything else."""
-    return rng.uniform(0.0, 3.0, loop.finger.mechanism.channels)
+    """Return inputs of a mechanism: tensions that pull, N, up to 0.1 mm that winches wind in, and anything else."""
+    drawn = rng.uniform(0.0, 3.0, loop.finger.mechanism.channels)
+    drawn[np.flatnonzero(loop.finger.routing.winched)] *= 3e-5
+    return drawn
 
 
 def readable_is_compiled(model: RandomModel) -> None:

@@ -89,13 +89,14 @@ def step_map_is_that_of_differences(model: RandomModel) -> None:
         simulator.step(near[len(x) :], _STEP)
         return np.array(simulator.x)
 
-    size = np.abs(found * scales / rows).max(axis=1)
+    # A row of a bristle that has long gone is rounding alone.
+    size = np.abs(found * scales / rows).max(axis=1) + 1e-12
     for k in rng.permutation(len(point))[:4]:
         shifts = [step * scales * (np.arange(len(point)) == k) for step in (1e-5, 3e-6)]
         coarse, fine = ((end(point + h) - end(point - h)) / (2.0 * h[k]) * scales[k] / rows[:, 0] for h in shifts)
         if np.all(np.abs(coarse - fine) < 5e-5 * size):
             error = np.abs(found[:, k] * scales[k] / rows[:, 0] - fine) / size
-            assert error.max() < 2e-4, f"{error.max():.3g} by {k}"
+            assert error.max() < 5e-4, f"{error.max():.3g} by {k}"
 
 
 def order_of_a_fit_does_not_matter(model: RandomModel) -> None:

@@ -3,6 +3,7 @@
 A and B of f are the exact derivatives that the integrator has. All others of f and h are differences of sixth order of
 the compiled evaluation, whose rounding they come near. Near a kink, such as where sliding reverses, they are of third
 order and from the state's side alone. At a kink, such as that of friction at rest, all are the mean of both sides.
+Those of the map are taken along on the steps of the motion, over kinks too.
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from finger_pin.analysis.step_map import StepMap
 from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.core.signals.rate_derivatives import rate_derivatives
+from finger_pin.core.stepping.period_map import PeriodMap
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, load_scenario
 from finger_pin.description.scenario import Scenario
@@ -36,8 +37,9 @@ _SLOPE_TOLERANCE, _MAX_TRIALS, _STEP_DIVISOR = 1e-4, 4, 10.0
 _ROUNDING_SHIFTS, _ROUNDING_FACTOR, _LEAST_ROUNDING = 1e-9 * np.arange(1.0, 5.0), 10.0, 1e-14
 # Steps: of the scale of a state, of an input in N or V, of the size of a parameter.
 _STATE_STEP, _INPUT_STEP, _PARAMETER_STEP = 1e-4, 1e-3, 1e-4
-# Steps of a map over these.
-_MAP_STEP_SHARE = 1e-3
+# Of the map: tolerance of its motion, the parts of dt that end a step each, which what a change sets off needs where
+# the motion itself does not, and the part of a parameter by which it is changed.
+_MAP_TOLERANCE, _MAP_PARTS, _PARAMETER_CHANGE = 1e-12, 16, 1e-7
 
 # Maps states, inputs, shapes (m, n) and (m, u), to numbers, shape (m, k).
 _Response = Callable[[Array, Array], Array]
@@ -84,7 +86,6 @@ def linearise(
         raise InputError("parameters", "are those of a scenario: give one in place of the finger", list(parameters))
     x = as_packed(finger, state, "state")
     u = as_inputs(finger, inputs)
-    step_map = None if dt is None else StepMap(finger, x, u, dt)
 
     def response(changed: Finger) -> _Response:
         compiled = CompiledFinger(changed)
@@ -108,14 +109,28 @@ def linearise(
             least=values == 0.0,
         )
     size = len(x)
-    if step_map is None:
+    if dt is None:
         by_state[0][:size], by_input[0][:size] = rate_derivatives(finger.mechanism, x, u)
     else:
-        value[:size] = step_map.end
-        by_state[0][:size], by_input[0][:size] = step_map.slopes(*(_MAP_STEP_SHARE * each for each in steps))
-        if parameters:
-            by_parameter[0][:size] = step_map.slopes_by(changed, values, _MAP_STEP_SHARE * sizes)
+        shifts = _PARAMETER_CHANGE * np.where(values == 0.0, 1.0, np.abs(values))
+        varied = [(changed(values + shift), shift.sum()) for shift in np.diag(shifts)]
+        value[:size], slopes = _map(finger, x, u, dt, varied)
+        by_state[0][:size], by_input[0][:size], by_parameter[0][:size] = np.split(slopes, [size, size + len(u)], axis=1)
     return _dataset(finger, value, (by_state, by_input, by_parameter), list(parameters), dt)
+
+
+def _map(finger: Finger, x: Array, u: Array, dt: float, varied: Sequence[tuple[Finger, float]]) -> tuple[Array, Array]:
+    """Return x(dt) and its derivatives by state, inputs and parameters, shapes (n,) and (n, n + u + p)."""
+    periods = PeriodMap(finger, x, varied, exact=True, method="Rodas5P", rtol=_MAP_TOLERANCE, atol_scale=_MAP_TOLERANCE)
+    periods.inputs[:] = u
+    size, first, last = len(x), len(x) + len(u), periods.derivatives.shape[1] - len(varied)
+    slopes = np.eye(size, periods.derivatives.shape[1])
+    for end in np.linspace(0.0, dt, _MAP_PARTS + 1)[1:]:
+        if failed := periods.advance(end):
+            raise InputError("state", f"cannot be integrated over dt: {failed}")
+        slopes, held = periods.derivatives[:, :size] @ slopes, periods.derivatives[:, size:]
+        slopes[:, size:] += held
+    return periods.x, np.delete(slopes, np.s_[first:last], axis=1)
 
 
 def _single_numbers(scenario: Scenario, parameters: Sequence[str]) -> tuple[Callable[[Array], Finger], Array]:

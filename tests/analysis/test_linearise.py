@@ -47,7 +47,7 @@ def test_the_map_over_a_step_is_the_matrix_exponential_at_rest(drum):
     whole = expm(2e-3 * np.block([[lin.A.values, further], [np.zeros((2, 6))]]))
     scale = np.abs(whole[:4]).max(axis=1, keepdims=True)
     found = np.concatenate([step.A.values, step.B.values, step.E.values], axis=1)
-    np.testing.assert_allclose(found / scale, whole[:4] / scale, atol=2e-5)
+    np.testing.assert_allclose(found / scale, whole[:4] / scale, atol=5e-5)
 
 
 def test_the_map_over_a_step_is_what_mujoco_s_steps_near_as_they_get_shorter():
@@ -99,7 +99,7 @@ def test_the_map_over_reversals_is_that_of_runs_from_changed_states(speed):
     columns = [(end(x + h * unit) - end(x - h * unit)) / (2.0 * h) for unit in np.eye(len(x))]
     found, expected = fp.linearise(finger, x, u, dt=dt), np.transpose(columns)
     rows = np.abs(expected).max(axis=1, keepdims=True)
-    np.testing.assert_allclose(found.A.values / rows, expected / rows, atol=2e-4)
+    np.testing.assert_allclose(found.A.values / rows, expected / rows, atol=1e-4)
     np.testing.assert_allclose(found.rate, end(x), rtol=1e-6, atol=1e-9)
 
 

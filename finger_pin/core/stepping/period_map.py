@@ -30,8 +30,8 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.rows import Rows
 from finger_pin.typing import Array
 
-# Changes for differences: of the scale of a state, of an input in N or V, of a force in N.
-_STATE_CHANGE, _INPUT_CHANGE, _FORCE_CHANGE = 1e-6, 1e-4, 1e-4
+# Changes for differences: of the scale of a state, of an input in N or V, of a winch's in m, of a force in N.
+_STATE_CHANGE, _INPUT_CHANGE, _WINDING_CHANGE, _FORCE_CHANGE = 1e-6, 1e-6, 1e-9, 1e-4
 # Numbers of motors whose currents are given: what was measured has flowed, whatever the supply.
 _UNLIMITED, _UNHEEDED = dict.fromkeys(("voltage", "current_limit"), np.inf), ("dry", "by_torque", "by_load", "viscous")
 _CURRENT_DRIVE = {"by_current": 1.0, **_UNLIMITED, **dict.fromkeys(_UNHEEDED, 0.0)}
@@ -64,6 +64,7 @@ class PeriodMap:
         varied: Sequence[tuple[Finger, float]] = (),
         *,
         currents: bool = False,
+        exact: bool = False,
         method: str = "Rodas4",
         rtol: float = 1e-4,
         atol_scale: float = 1e-4,
@@ -75,6 +76,7 @@ class PeriodMap:
             x: Packed state, shape (n,).
             varied: The finger with one parameter changed, and by how much, for each of p parameters.
             currents: Whether inputs of motors are the currents that flow, A, in place of commands of their drives.
+            exact: Whether derivatives heed what changes within a step, at four times the cost.
             method: A compiled method.
             rtol: Relative tolerance.
             atol_scale: Absolute tolerance over the scale of each kind of state.
@@ -107,30 +109,43 @@ class PeriodMap:
         self._models = [BoundModel(structure, each, laws, control, linearised=False) for each in all_parameters]
         self._evaluator, self._record = CompiledMechanism(mechanism), self._integrator.room(1)
         args, unit = self._integrator.ready(self._record)
-        size, held = len(start), len(self.inputs) + forces.size + len(varied)
-        changes = [_INPUT_CHANGE] * len(self.inputs) + [_FORCE_CHANGE] * forces.size + [change for _, change in varied]
-        self.derivatives = np.zeros((size, size + held))
-        self._args = PeriodArgs(
-            advance=unit.address,
+        changes = [*self._input_changes(), *np.full(forces.size, _FORCE_CHANGE), *(change for _, change in varied)]
+        self._args = self._arguments(unit.address, args, exact, np.array(changes))
+        self.derivatives = self._args.derivatives
+        self._bind()
+        self.advance_address, self.limit_address = advance_period.address, limit_bristles.address
+        self.restart(start)
+
+    def _arguments(self, advance: int, args: int, exact: bool, changes: Array) -> PeriodArgs:
+        """Return the arguments of compiled code, with changes of what is held for differences, shape (m,)."""
+        size, held = len(self.x), len(changes)
+        return PeriodArgs(
+            advance=advance,
             args=args,
+            exact=exact,
             plain=self._models[0].address,
             varied=np.array([each.address for each in self._models[1:]], dtype=np.int64),
-            derivatives=self.derivatives,
+            derivatives=np.zeros((size, size + held)),
             held=np.zeros((size, held)),
             inverse=np.zeros((size, size)),
             terms=np.zeros((2 * size, size + held)),
-            weights=np.zeros(4),
+            weights=np.zeros(6),
             right=np.zeros(size + 1),
-            steps=np.concatenate([_STATE_CHANGE * finger.layout.scales(), changes]),
-            weights_of_rows=np.zeros((2, len(structure.state), 0)),
+            start=np.zeros(size),
+            state=np.zeros(size),
+            steps=np.concatenate([_STATE_CHANGE * self.finger.layout.scales(), changes]),
+            weights_of_rows=np.zeros((2, len(self._structure.state), 0)),
             watched=np.zeros(0),
             slopes=np.zeros((0, size + held)),
             bristles=self._bristles(),
             levels=np.full(size, np.inf),
         )
-        self._bind()
-        self.advance_address, self.limit_address = advance_period.address, limit_bristles.address
-        self.restart(start)
+
+    def _input_changes(self) -> Array:
+        """Return by how much inputs are changed for differences, shape (u,)."""
+        changes = np.full(len(self.inputs), _INPUT_CHANGE)
+        changes[np.flatnonzero(self.finger.routing.winched)] = _WINDING_CHANGE
+        return changes
 
     def _rows(self) -> Iterator[tuple[Rows, NDArray[np.int64]]]:
         """Yield the tables of the mechanism, each with the places of its rows among all."""
