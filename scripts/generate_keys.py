@@ -156,7 +156,9 @@ _FURTHER: tuple[tuple[str, dict[str, Any]], ...] = (
     ("fig6", {"controller.sampling.period": 1e-3}),
     ("canal", {"finger.tendons.T1.winch": {}, "controller": {"tendon_winding": {"T1": {"offset": 0.001}}}}),
     ("servo_bench", {"finger.actuators.*.motor.friction.backlash": 0.01}),
+    ("servo_bench", {"finger.actuators.*.motor.cogging": {"amplitude": 1e-3, "per_turn": 24.0}}),
     ("press", {"environment.objects.*.path.x.amplitude": 1e-3}),
+    ("pour", {"environment.objects.ball_0.damping": 1e-3}),
 )
 
 

@@ -195,6 +195,15 @@ def position_drive(rng: np.random.Generator, table: Table) -> bool:
     return _servo(rng, table, "drive", _motor(rng), drive="position", position_loop=loop | {"integral": 0.5})
 
 
+def cogging(rng: np.random.Generator, table: Table) -> bool:
+    """Give the motors magnets that hold on to teeth."""
+    motors = [each["motor"] for each in table["finger"].get("actuators", {}).values()]
+    for motor in motors:
+        numbers = {"amplitude": decades(rng, 1e-4, 1e-1), "per_turn": decades(rng, 3.0, 1e3)}
+        motor["cogging"] = numbers | {"phase": float(rng.uniform(-3.0, 3.0))}
+    return bool(motors)
+
+
 def winch(rng: np.random.Generator, table: Table) -> bool:
     """Let an ideal winch wind in a tendon."""
     free = _free_tendons(table)

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from random_fingers import CHAIN_FEATURES, Feature, chain, direction, swing
-from random_surroundings import TREE_FEATURES
+from random_fingers import CHAIN_FEATURES, Feature, chain, cogging, direction, swing
+from random_surroundings import TREE_FEATURES, wrench
 from random_trees import tendon_coupling, tree
 
 from finger_pin.description.caching import cached_property
@@ -173,10 +173,10 @@ def _each_finger(feature: Feature) -> Feature:
 _OF_RUNS: dict[str, Feature] = {"swinging inputs": _swinging, "start time": _start_time, "tip force": _tip_force}
 #: All features by the kind of model that may have them, one a line in the tables of the modules that add them.
 FEATURES: dict[str, dict[str, Feature]] = {
-    "tree": TREE_FEATURES | _OF_RUNS | {"tendon coupling": tendon_coupling},
-    "finger": CHAIN_FEATURES | _OF_RUNS,
+    "tree": TREE_FEATURES | _OF_RUNS | {"tendon coupling": tendon_coupling, "wrench": wrench, "cogging": cogging},
+    "finger": CHAIN_FEATURES | _OF_RUNS | {"cogging": cogging},
     "hand": {name: _each_finger(feature) for name, feature in CHAIN_FEATURES.items()}
     | _OF_RUNS
-    | {"palm path": _palm_path},
+    | {"palm path": _palm_path, "cogging": _each_finger(cogging)},
 }
 BASES: dict[str, Callable[[np.random.Generator], Table]] = {"tree": _tree, "finger": _finger, "hand": _hand}

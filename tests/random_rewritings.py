@@ -16,7 +16,7 @@ from finger_pin.description.commands import BY_NAME
 
 #: Mirrored at y = 0.
 MIRROR = np.array([1.0, -1.0, 1.0])
-_VECTORS = ("position", "other_position", "anchor", "centre", "side", "velocity")
+_VECTORS = ("position", "other_position", "force", "anchor", "centre", "side", "velocity")
 
 
 def renamed(model: RandomModel) -> tuple[Table, Table]:
@@ -64,7 +64,7 @@ def _mirror(value: Table) -> None:
             value[key] = (np.array([-1.0, 1.0, -1.0, 1.0]) * each).tolist()
         elif key == "axis":
             value[key] = ((1.0 if value.get("kind") == "slide" else -1.0) * MIRROR * each).tolist()
-        elif key == "angular_velocity":
+        elif key in ("angular_velocity", "torque"):
             value[key] = (-MIRROR * each).tolist()
         elif key == "inertia":
             value[key] = (np.array([1.0, 1.0, 1.0, -1.0, 1.0, -1.0]) * each).tolist()
@@ -89,6 +89,10 @@ def turned(model: RandomModel) -> tuple[Table, Table]:
             each["velocity"] = (turn @ each["velocity"]).tolist()
     for loop in inner.get("loops", {}).values():
         loop["other_position"] = (shift + turn @ loop["other_position"]).tolist()
+    for push in (each["wrench"] for each in inner.get("actuators", {}).values() if "wrench" in each):
+        if push.get("axes") == "other" and "other" not in push:
+            push["other_position"] = (shift + turn @ push["other_position"]).tolist()
+            push |= {key: (turn @ push[key]).tolist() for key in ("force", "torque") if key in push}
     finger["gravity"] = (turn @ finger["gravity"]).tolist()
     if "fingertip_force" in other["environment"]:
         other["environment"]["fingertip_force"] = (turn @ other["environment"]["fingertip_force"]).tolist()

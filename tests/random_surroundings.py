@@ -69,6 +69,24 @@ def muscle(rng: np.random.Generator, table: Table) -> bool:
     return acted
 
 
+def wrench(rng: np.random.Generator, table: Table) -> bool:
+    """Push a body at a point, along its own axes, or those of the base or a body that carries it."""
+    inner = table["finger"]["tree"]
+    body = str(rng.choice([*inner["bodies"]]))
+    push = {"body": body, "position": rng.normal(0.0, 0.02, 3).tolist(), "force": rng.normal(size=3).tolist()}
+    if rng.random() < 0.6:
+        push["torque"] = rng.normal(0.0, 0.02, 3).tolist()
+    if rng.random() < 0.6:
+        push |= {"axes": "other", "other_position": rng.normal(0.0, 0.02, 3).tolist()}
+        push |= {"other": parent} if (parent := inner["bodies"][body].get("parent")) else {}
+    gain = decades(rng, 1e-2, 1.0)
+    held = {"by_length": -gain} if push.get("axes") and "torque" not in push else {}
+    inner["actuators"]["wrench"] = {"wrench": push, "gain": gain, "by_speed": -0.01 * gain, **held}
+    inner["actuators"]["wrench"]["input_range"] = [-0.2, 0.3]
+    table["controller"].setdefault("inputs", {})["wrench"] = swing(rng, 0.01, 0.2)
+    return True
+
+
 def _shape(rng: np.random.Generator) -> Table:
     shape = str(rng.choice([*trees.SHAPES]))
     return {"shape": shape, **trees.SHAPES[shape](rng), "orientation": direction(rng, 4).tolist()}
@@ -117,6 +135,8 @@ def free_object(rng: np.random.Generator, table: Table) -> bool:
     thrown |= {"position": (place + 2.0 * trees.REACH * away).tolist(), "mass": decades(rng, 1e-3, 0.1)}
     objects = table["finger"]["tree"]["objects"]
     objects["free"] = _shape(rng) | thrown | _surface(rng) | {"apart": [*objects]}
+    if rng.random() < 0.5:
+        objects["free"] |= {"damping": decades(rng, 1e-3, 1.0), "angular_damping": decades(rng, 1e-7, 1e-4)}
     return True
 
 

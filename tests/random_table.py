@@ -72,7 +72,7 @@ _NOT_SETTLED = (
     *("joint friction", "joint drag", "one per joint", "swinging inputs", "start time", "cord", "wraps", "pulleys"),
     *("sum of joints", "tendon range", "joint path", "coupling", "loop", "motor", "joint servo", "lag", "integrator"),
     *("integral", "slew", "delay", "muscle", "fixed object", "free object", "moved object", "keyframe"),
-    "tendon coupling",
+    *("tendon coupling", "wrench"),
 )
 # What is more than tensions that are held: recordings give those alone.
 _NOT_RECORDED = ("servo", "play", "position drive", "winch", "passive tendon", *_NOT_HELD)
@@ -81,7 +81,8 @@ DOORS: dict[str, Door] = {
     "Jacobian = differences": Door(doors.jacobian_is_that_of_differences),
     "rigid body = energies": Door(doors.rigid_body_is_that_of_energies),
     "linearise = differences": Door(doors.linearisation_is_that_of_differences),
-    "equilibrium rests": Door(doors.equilibrium_is_at_rest),
+    # What turns with a body has no energy.
+    "equilibrium rests": Door(doors.equilibrium_is_at_rest, without=("wrench",)),
     "URDF read = body": Door(doors.urdf_is_read_as_the_same_body),
     "account": Door(runs.account_closes),
     "prepared = fresh": Door(runs.prepared_is_fresh),

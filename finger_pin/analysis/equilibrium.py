@@ -203,6 +203,9 @@ def _check_can_rest(finger: Finger) -> None:
     for name, actuator in description.tree.actuators.items():
         if actuator.integrates or actuator.integral:
             raise InputError(description.entry("tree.actuators", name), "integrates: it rests at no input of its own")
+        if actuator.wrench and not actuator.wrench.has_length:
+            allowed = 'must be a force with axes = "other", the slope of an energy, which falls to a rest'
+            raise InputError(f"{description.entry('tree.actuators', name)}.wrench", allowed)
 
 
 def _held_by_friction(signals: FingerSignals) -> float:

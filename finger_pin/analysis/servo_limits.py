@@ -17,7 +17,8 @@ from finger_pin.typing import Array
 def tension_limits(finger: FingerLike, *, holding: bool = False) -> tuple[float, ...]:
     """Return the greatest tension at every actuated tendon's spool, N, in slow motion or at rest.
 
-    The current is at most I_max, and V / R. Of several tendons on one spool each has it while the others are slack.
+    The current is at most I_max, and V / R; cogging takes its amplitude in motion, and may help at rest. Of several
+    tendons on one spool each has it while the others are slack.
 
     Args:
         finger: With actuators; a tendon without one has no limit: infinity.
@@ -28,10 +29,11 @@ def tension_limits(finger: FingerLike, *, holding: bool = False) -> tuple[float,
     for actuator in finger.description.actuators.values():
         motor, gears = actuator.motor, actuator.motor.friction
         constant, resistance, dry = motor.constants
-        torque = constant * min(motor.maximum_current, motor.voltage / resistance)
+        sign = 1.0 if holding else -1.0
+        cogging = motor.cogging.amplitude if motor.cogging else 0.0
+        torque = max(0.0, constant * min(motor.maximum_current, motor.voltage / resistance) + sign * cogging)
         dry, weight = dry + gears.stribeck, gears.external_weight
         by_load = gears.by_load + gears.stribeck_by_load
-        sign = 1.0 if holding else -1.0
         arriving, divisor = torque * (1.0 + sign * by_load) + sign * dry, 1.0 - sign * by_load * weight
         limit = max(0.0, arriving / divisor) if divisor > 0.0 else np.inf
         for tendon, radius in zip(actuator.tendons, expand(actuator.spool_radius, len(actuator.tendons)), strict=True):

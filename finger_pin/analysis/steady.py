@@ -62,9 +62,17 @@ def steady_state(
         speed: v, shape (m,), m/s, of all of them; positive as they are drawn in.
         position: theta, shape (m, n), rad, for the curvature of the paths; zero by default.
         at_rest: Whether they rest after having slid so: bristles keep what they hold, viscous friction is gone.
+
+    Raises:
+        InputError: If motors with cogging, whose current is the mean over its periods while they turn, are at rest.
     """
     finger, pulled = _with_ideal_sources(finger) if isinstance(finger, Finger) else _from_description(describe(finger))
     actuators, v = finger.actuators, np.asarray(speed, dtype=float)[:, None]
+    if at_rest and np.any(actuators.cogging[0]):
+        allowed = (
+            "tells no current at rest, where it depends on the angle: leave cogging out, or take readings in motion"
+        )
+        raise InputError("finger.actuators.*.motor.cogging", allowed)
     actuated = finger.routing.actuated
     postures = np.zeros((len(v), len(finger.routing.joints))) if position is None else position
     x = np.tile(pulled.rest_state(np.zeros(postures.shape[1])), (len(v), 1))

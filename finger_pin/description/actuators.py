@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from finger_pin.description.cogging import Cogging
 from finger_pin.description.validation import (
     Description,
     Name,
@@ -137,6 +138,7 @@ class Motor(Description):
         ..., unit="kg m2", source="fit", doc="J, of the rotor times the square of the gear ratio, and of the gears."
     )
     friction: GearFriction = Field(GearFriction(), description="Of the gearbox.")
+    cogging: Cogging | None = Field(None, description="The torque of its magnets over the angle.")
     encoder: Encoder | None = Field(None, description="For a position drive.")
     winding: Winding | None = Field(None, description="For the metric winding_temperature.")
 

@@ -16,6 +16,7 @@ from finger_pin.description.parameters import Joint, Link, Tendon
 from finger_pin.description.primitives import Triple
 from finger_pin.description.surface import BodyShape
 from finger_pin.description.tree import Tree
+from finger_pin.description.tree_actuators import Wrench
 from finger_pin.description.tree_parts import Body, Keyframe, Tip, TreeJoint, TreeSolid
 from finger_pin.description.waypoints import SidePoint
 from finger_pin.exceptions import InputError
@@ -166,6 +167,10 @@ def _named_in_hand(tree: Tree, finger: str, base: str) -> dict[str, dict[str, An
     def side(point: SidePoint | None) -> SidePoint | None:
         return point and point.updated(body=on_body(point.body))
 
+    def wrench(one: Wrench | None) -> Wrench | None:
+        other = on_body(one.other) if one and one.axes == "other" else None
+        return one and one.updated(body=on_body(one.body), other=other)
+
     return {
         "bodies": keyed(tree.bodies, parent=on_body, solids=solids, shapes=keyed),
         "joints": keyed(tree.joints, body=on_body),
@@ -176,7 +181,7 @@ def _named_in_hand(tree: Tree, finger: str, base: str) -> dict[str, dict[str, An
         ),
         "couplings": keyed(tree.couplings, joint=named, tendon=named, other=named),
         "loops": keyed(tree.loops, body=on_body, other=on_body),
-        "actuators": keyed(tree.actuators, joint=named, tendon=named),
+        "actuators": keyed(tree.actuators, joint=named, tendon=named, wrench=wrench),
         "keyframes": keyed(tree.keyframes, position=keyed, velocity=keyed, inputs=keyed),
         "tips": {
             ".".join(filter(None, (finger, name))): tip.updated(body=on_body(tip.body))

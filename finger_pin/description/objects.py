@@ -93,6 +93,12 @@ class Object(ObjectState, Shaped):
         source="design",
         doc="About the mass centre, along the object's axes: xx, yy, zz, xy, xz, yz; of even density without.",
     )
+    damping: Annotated[float, real(0.0, 1e6)] = quantity(
+        0.0, unit="N s/m", source="fit", doc="d of a free object: -d v on its origin, whose velocity is v, base frame."
+    )
+    angular_damping: Annotated[float, real(0.0, 1e6)] = quantity(
+        0.0, unit="N m s/rad", source="fit", doc="Torque against its turning over the angular velocity, likewise."
+    )
     path: dict[Name, PathSignal] | None = Field(
         None, description="Path along which it is moved: growth of x, y and z of its position over time, base frame."
     )
@@ -128,8 +134,8 @@ class Object(ObjectState, Shaped):
             raise problem("path", "is for objects without a mass: one with a mass is free, and goes where it is pushed")
         if self.mass is None:
             self.check_at_rest()
-            for entry in ("centre", "inertia"):
-                if any(getattr(self, entry) or ()):
+            for entry in ("centre", "inertia", "damping", "angular_damping"):
+                if np.any(getattr(self, entry) or 0.0):
                     raise problem(entry, "is for objects with a mass", getattr(self, entry))
         return self
 

@@ -87,6 +87,8 @@ class Tree(Description):
         for name, actuator in self.actuators.items():
             _check(f"actuators.{name}.joint", actuator.joint, self.joints, "joint")
             _check(f"actuators.{name}.tendon", actuator.tendon, self.tendons, "tendon")
+            for entry in ("body", "other"):
+                _check(f"actuators.{name}.wrench.{entry}", getattr(actuator.wrench, entry, None), self.bodies, "body")
         self._check_shapes()
         self._check_paths()
         if self.tip is not None and self.tips:
@@ -139,11 +141,8 @@ class Tree(Description):
         described = self.tendons[tendon]
         # A sum of joint positions that is no cord, or that stands beside a path, shows no bend.
         winds = float(described.path is None and self._is_cord(tendon))
-        arms = (
-            CordElement(joint, frozenset({joint}), -gain, winds)
-            for joint, gain in (described.joints or {}).items()
-            if gain
-        )
+        gains = (described.joints or {}).items()
+        arms = (CordElement(joint, frozenset({joint}), -gain, winds) for joint, gain in gains if gain)
         (_, trunk), *branches = self._legs(described.path or {})
         return Cord(
             (*arms, *trunk),
@@ -225,9 +224,9 @@ class Tree(Description):
                 wrap = key, waypoint
             else:
                 if before is not None:
-                    legs, first = parts[-1][1], self._movers(before.body)
-                    about = self._movers(wrap[1].body) if wrap else first
-                    crossed = frozenset((self._movers(waypoint.body) ^ first) | (about ^ first))
+                    legs, first = parts[-1][1], self.movers(before.body)
+                    about = self.movers(wrap[1].body) if wrap else first
+                    crossed = frozenset((self.movers(waypoint.body) ^ first) | (about ^ first))
                     name, ends = str(len(legs) + 1), (before, waypoint)
                     legs.append(CordElement(name, crossed, points=ends, wrap=wrap, follows=bool(legs)))
                 before, wrap = waypoint, None
@@ -280,7 +279,7 @@ class Tree(Description):
         """Return the joints of a body on its parent, in order."""
         return [name for name, joint in self.joints.items() if joint.body == body]
 
-    def _movers(self, body: str | None) -> set[str]:
+    def movers(self, body: str | None) -> set[str]:
         """Return the joints that move a body."""
         movers = set[str]()
         while body is not None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from finger_pin.description.validation import Description, Name, problem, quantity, real, vector
+from finger_pin.description.primitives import Triple
+from finger_pin.description.validation import Description, Name, choice, problem, quantity, real, vector
+from finger_pin.description.waypoints import BODY_POINT
 
 Pair = tuple[float, float]
 _MUJOCO = "MuJoCo's default"
@@ -66,8 +68,48 @@ class Muscle(Description):
         return (self.length_range[1] - self.length_range[0]) / (self.range[1] - self.range[0])
 
 
+class Wrench(Description):
+    """Force and torque on a body at a point, per force of the actuator: a thruster, or a hand that pulls a tip."""
+
+    body: Name = Field(description="The body that it pushes.")
+    position: Annotated[Triple, BODY_POINT] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Of the point in that body's frame."
+    )
+    force: Annotated[Triple, vector(3, -1e6, 1e6)] = quantity(
+        (0.0, 0.0, 0.0), unit="1", source="design", doc="Force per force of the actuator."
+    )
+    torque: Annotated[Triple, vector(3, -1e6, 1e6)] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="Torque per force of the actuator."
+    )
+    axes: Annotated[Literal["body", "other"], choice("body", "other")] = quantity(
+        "body",
+        unit="1",
+        source="design",
+        doc="Whose axes force and torque have: the body's, pushed from outside, or those of other, which bears them. A "
+        "force along these has a length, from other_position to position.",
+    )
+    other: Name | None = Field(None, description="The body that bears the reaction; the base if left out.")
+    other_position: Annotated[Triple, BODY_POINT] = quantity(
+        (0.0, 0.0, 0.0), unit="m", source="design", doc="In the frame of other: where its length counts from."
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if not any((*self.force, *self.torque)):
+            raise problem("force", "is missing: give force, torque or both")
+        for entry in ("other", "other_position"):
+            if self.axes == "body" and getattr(self, entry) != type(self).model_fields[entry].default:
+                raise problem(entry, 'is for axes = "other"', getattr(self, entry))
+        return self
+
+    @property
+    def has_length(self) -> bool:
+        """Whether it is the force along a length."""
+        return self.axes == "other" and not any(self.torque)
+
+
 class TreeActuator(Description):
-    """The drive of a joint or a tendon: gain u + offset + by_length l + by_speed l'; l is gear times its length.
+    """The drive of a joint, tendon or wrench: gain u + offset + by_length l + by_speed l'; l is gear times its length.
 
     With ``time_constant`` its input comes late, T a' = u - a, and a takes the place of u; with ``integrates`` its input
     is a rate, a' = u. With ``integral`` the force grows with the sum of the error e, e' = u - l: by integral e.
@@ -77,6 +119,7 @@ class TreeActuator(Description):
 
     joint: Name | None = Field(None, description="The joint that it drives.")
     tendon: Name | None = Field(None, description="The tendon that it drives.")
+    wrench: Wrench | None = Field(None, description="Force and torque at a point of a body, in their place.")
     gear: Annotated[float, real(-1e6, 1e6)] = quantity(
         1.0, unit="1", source="design", doc="Its length, and the arm of its force, over those of what it drives."
     )
@@ -127,9 +170,16 @@ class TreeActuator(Description):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        if (self.joint is None) == (self.tendon is None):
-            raise problem("", "drives a joint or a tendon, and not both")
+        if sum(each is not None for each in (self.joint, self.tendon, self.wrench)) != 1:
+            raise problem("", "drives one of joint, tendon and wrench")
+        if self.wrench is not None and not self.wrench.has_length:
+            for entry in ("by_length", "integral"):
+                if getattr(self, entry):
+                    allowed = 'needs a length, which a wrench has by a force with axes = "other" alone'
+                    raise problem(entry, allowed, getattr(self, entry))
         if self.muscle is not None:
+            if self.wrench is not None:
+                raise problem("muscle", "drives a joint or a tendon, no wrench")
             for entry in sorted(self.model_fields_set - {"joint", "tendon", "gear", "input_range", "delay", "muscle"}):
                 if getattr(self, entry) != type(self).model_fields[entry].default:
                     raise problem(entry, "has no effect beside muscle; leave it out", getattr(self, entry))

@@ -11,7 +11,8 @@ import pinocchio as pin
 from numpy.polynomial import Polynomial
 
 from finger_pin.description.finger_description import FingerDescription
-from finger_pin.description.tree_actuators import TreeActuator
+from finger_pin.description.tree import Tree
+from finger_pin.description.tree_actuators import TreeActuator, Wrench
 from finger_pin.description.tree_couplings import Coupling
 from finger_pin.description.tree_parts import Keyframe
 from finger_pin.exceptions import InputError
@@ -67,8 +68,13 @@ def _polynomial(entry: str, coupling: Coupling, description: FingerDescription) 
     return [*coefficients[: _MAX_POWER + 1].tolist(), *[0.0] * (_MAX_POWER + 1 - len(coefficients))]
 
 
-def add_actuators(root: ET.Element, description: FingerDescription, step: float) -> None:
-    """Add the motors of tendons that ideal sources pull, and the actuators of a tree, for a time step, s."""
+def add_actuators(
+    root: ET.Element, description: FingerDescription, step: float, bodies: Mapping[str | None, ET.Element]
+) -> None:
+    """Add the motors of tendons that ideal sources pull, and the actuators of a tree, for a time step, s.
+
+    Bodies are elements by name; that of the world by None.
+    """
     table = ET.SubElement(root, "actuator")
     for name, tendon in description.tendons.items():
         entry = description.entry("tendons", name)
@@ -77,15 +83,35 @@ def add_actuators(root: ET.Element, description: FingerDescription, step: float)
             raise InputError(f"{entry}.{key}", "is not written: a tendon beside a tree is pulled by an ideal source")
         limits = {"ctrllimited": "true", "ctrlrange": numbers(0.0, tendon.maximum_tension or _MAX_TENSION)}
         ET.SubElement(table, "motor", {"name": name, "tendon": tendon.along or name, "gear": "-1", **limits})
-    for name, actuator in description.tree.actuators.items():
+    for k, (name, actuator) in enumerate(description.tree.actuators.items()):
         attributes = {"name": name, "gear": numbers(actuator.gear)}
-        attributes |= {"joint": actuator.joint} if actuator.joint else {"tendon": str(actuator.tendon)}
+        if actuator.wrench:
+            entry = f"{description.entry('tree.actuators', name)}.wrench"
+            attributes |= _at_sites(entry, k, actuator.wrench, actuator.gear, description.tree, bodies)
+        else:
+            attributes |= {"joint": actuator.joint} if actuator.joint else {"tendon": str(actuator.tendon)}
         attributes |= _limits("ctrl", actuator.input_range) | _limits("force", actuator.force_range)
         if actuator.delay:
             samples = math.ceil(actuator.delay / min(step, _DELAY_STEP)) + 2
             attributes |= {"delay": numbers(actuator.delay), "nsample": str(samples)}
         kind, law = _law(description.entry("tree.actuators", name), actuator)
         ET.SubElement(table, kind, attributes | law)
+
+
+def _at_sites(
+    entry: str, k: int, wrench: Wrench, gear: float, tree: Tree, bodies: Mapping[str | None, ET.Element]
+) -> dict[str, str]:
+    """Return what makes an actuator the k-th wrench, with the sites that it acts at."""
+    site, refsite = f"wrench_{k}", f"wrench_{k}_from"
+    ET.SubElement(bodies[wrench.body], "site", name=site, pos=numbers(*wrench.position))
+    attributes = {"site": site, "gear": numbers(*(gear * each for each in (*wrench.force, *wrench.torque)))}
+    if wrench.axes == "body":
+        return attributes
+    if any(wrench.force) and not tree.movers(wrench.other) <= tree.movers(wrench.body):
+        allowed = "is not written: MuJoCo lets a force react at refsite, as here where that is on the base or carries"
+        raise InputError(f"{entry}.other", f"{allowed} {wrench.body}", wrench.other)
+    ET.SubElement(bodies[wrench.other], "site", name=refsite, pos=numbers(*wrench.other_position))
+    return attributes | {"refsite": refsite}
 
 
 def _limits(prefix: str, ends: Sequence[float] | None) -> dict[str, str]:
@@ -141,10 +167,11 @@ def add_keyframes(
     for name, keyframe in keyframes.items():
         qpos, qvel, objects = list[float](), list[float](), tree.objects_at(keyframe)
         for body in bodies:
-            for joint in (each.get("name", "") for each in body.findall("joint")):
+            free_joint = body.find("freejoint") is not None or body.find("joint[@type='free']") is not None
+            for joint in () if free_joint else (each.get("name", "") for each in body.findall("joint")):
                 qpos.append(keyframe.position.get(joint, tree.joints[joint].reference))
                 qvel.append(keyframe.velocity.get(joint, 0.0))
-            if body.find("freejoint") is not None:
+            if free_joint:
                 free = objects[body.get("name", "")]
                 qpos += [*free.position, *np.roll(free.quaternion, 1).tolist()]
                 qvel += [*free.velocity, *free.angular_velocity]

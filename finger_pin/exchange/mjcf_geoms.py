@@ -84,7 +84,10 @@ def add_objects(world: ET.Element, tree: Tree) -> dict[str, str]:
             continue
         pose = {"pos": numbers(*item.position), "quat": quaternion(item.orientation)}
         body = ET.SubElement(world, "body", {"name": name, **pose})
-        ET.SubElement(body, "freejoint")
+        # A freejoint has no attributes.
+        ET.SubElement(
+            body, *(("joint", {"type": "free", "damping": numbers(item.damping)}) if item.damping else ("freejoint",))
+        )
         inertia = {"pos": numbers(*item.centre), "mass": numbers(item.mass), "fullinertia": numbers(*item.moments)}
         ET.SubElement(body, "inertial", inertia)
         geoms[name] = f"{name}_geom"

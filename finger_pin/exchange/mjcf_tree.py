@@ -74,6 +74,11 @@ def _header(description: FingerDescription) -> str:
         left_out += ["that cords with slack are not damped while they are slack: dampers act at any length;"]
     if any(body.shapes for body in description.tree.bodies.values()) or description.tree.objects:
         left_out += [f"{line};" for line in CONTACTS_LEFT_OUT]
+    left_out += [
+        f"angular_damping of object {name}, {each.angular_damping:g} N m s/rad, which is its damping, {each.damping:g};"
+        for name, each in description.tree.objects.items()
+        if each.damping != each.angular_damping
+    ]
     left_out += (
         ["paths of joints, whose bodies are mocap bodies: lead them by mocap_pos;"] if description.tree.on_paths else []
     )
@@ -97,7 +102,12 @@ class _Writer(BodyWriter):
         squares = [tendon.stiffness * of_tendons[name] for name, tendon in tendons]
         squares += [stiffness * of_joints[name] for name, stiffness in springs.items()]
         for actuator in self.tree.actuators.values():
-            mobility = of_joints[actuator.joint] if actuator.joint else of_tendons[str(actuator.tendon)]
+            if actuator.wrench:
+                mobility = (
+                    self.mobility.bodies[actuator.wrench.body] * float(np.linalg.norm(actuator.wrench.force)) ** 2
+                )
+            else:
+                mobility = of_joints[actuator.joint] if actuator.joint else of_tendons[str(actuator.tendon)]
             squares.append(abs(actuator.by_length) * actuator.gear**2 * mobility)
         stops = [tendon.limit_stiffness * of_tendons[name] for name, tendon in tendons if tendon.range]
         if self.limits:
@@ -122,7 +132,7 @@ class _Writer(BodyWriter):
                 for joint, crossing in pulled.crossings.items():
                     ET.SubElement(fixed, "joint", joint=joint, coef=numbers(-crossing.radius))
         add_equalities(root, self.description, self.elements, self.mobility)
-        add_actuators(root, self.description, step)
+        add_actuators(root, self.description, step, self.elements)
 
     def _add_tendon(self, table: ET.Element, name: str, tendon: TreeTendon) -> None:
         if tendon.path is not None and any((tendon.joints or {}).values()):

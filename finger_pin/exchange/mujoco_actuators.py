@@ -10,6 +10,7 @@ from finger_pin.description.tree import LARGEST_RADIUS
 from finger_pin.description.tree_actuators import Muscle
 from finger_pin.exchange.mujoco_equalities import coupled_tendons
 from finger_pin.exchange.mujoco_names import Table, model_name, unused_name
+from finger_pin.exchange.mujoco_sites import at_site, moves_site, target_kind, target_problem
 from finger_pin.exchange.mujoco_unsupported import ElementReader, is_disabled
 from finger_pin.typing import Array
 
@@ -54,8 +55,9 @@ class ActuatorReader(ElementReader):
         """Supported actuator laws as entries of a description; unsupported ones are listed."""
         laws = {}
         for i in range(getattr(self.model, "nactuator", self.model.nu)):
-            reason = is_disabled(self.mujoco, self.model, i) or self._target_problem(i)
+            reason = is_disabled(self.mujoco, self.model, i) or target_problem(self, i)
             law = self._law(i) if reason is None else reason
+            law = at_site(self, i, law) if isinstance(law, dict) and self._drives(i)[0] == "site" else law
             if isinstance(law, str):
                 self._leave_out(i, law)
             else:
@@ -74,10 +76,10 @@ class ActuatorReader(ElementReader):
         for i in self.laws:
             if i in self.tendon_motors:
                 continue
-            kind, target = model.actuator_trntype[i], int(model.actuator_trnid[i, 0])
-            of_tendon = kind == self.mujoco.mjtTrn.mjTRN_TENDON
+            kind, target = self._drives(i)
+            named = {"joint": self.names.joints, "tendon": self.names.tendons}
             actuators[i] = {
-                **({"tendon": self.names.tendons[target]} if of_tendon else {"joint": self.names.joints[target]}),
+                **({kind: named[kind][target]} if kind in named else {}),
                 "gear": float(model.actuator_gear[i, 0]),
                 **self.laws[i],
             }
@@ -127,12 +129,11 @@ class ActuatorReader(ElementReader):
 
     def _force_limits(self, i: int) -> tuple[float, float]:
         """Return the limits of an actuator's force, its own and those of the joint or tendon that it alone drives."""
-        model, mujoco = self.model, self.mujoco
+        model, (kind, target), gear = self.model, self._drives(i), float(self.model.actuator_gear[i, 0])
         low, high = model.actuator_forcerange[i] if model.actuator_forcelimited[i] else (-np.inf, np.inf)
-        target, gear = int(model.actuator_trnid[i, 0]), float(model.actuator_gear[i, 0])
-        kind = "tendon" if model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_TENDON else "joint"
         prefix = "tendon_actfrc" if kind == "tendon" else "jnt_actfrc"
-        if getattr(model, f"{prefix}limited")[target] and gear and self._drivers(kind, target) == [i]:
+        is_limited = kind != "site" and getattr(model, f"{prefix}limited")[target]
+        if is_limited and gear and self._drivers(kind, target) == [i]:
             ends = sorted(getattr(model, f"{prefix}range")[target] / gear)
             low, high = max(low, ends[0]), min(high, ends[1])
         return float(low), float(high)
@@ -150,12 +151,13 @@ class ActuatorReader(ElementReader):
                     self.left_out.add(f"joint {name}: {reason}")
 
     def _drivers(self, kind: str, target: int) -> list[int]:
-        """Return the actuators that exert a force on a tendon, or on a joint by itself or by tendons."""
+        """Return the actuators that exert a force on a tendon, or on a joint by itself, by tendons or at sites."""
         targets = {(kind, target)}
         if kind == "joint":
             dof = int(self.model.jnt_dofadr[target])
             targets |= {("tendon", i) for i, moved in enumerate(self._moved_dofs) if dof in moved}
-        return [i for i in self.laws if self._drives(i) in targets]
+        at_sites = {i for i in self.laws if kind == "joint" and moves_site(self, i, target)}
+        return [i for i in self.laws if self._drives(i) in targets or i in at_sites]
 
     @cached_property
     def _moved_dofs(self) -> list[set[int]]:
@@ -169,8 +171,7 @@ class ActuatorReader(ElementReader):
 
     def _drives(self, i: int) -> tuple[str, int]:
         """Return the kind and number of what an actuator drives."""
-        of_tendon = self.model.actuator_trntype[i] == self.mujoco.mjtTrn.mjTRN_TENDON
-        return "tendon" if of_tendon else "joint", int(self.model.actuator_trnid[i, 0])
+        return target_kind(self, i), int(self.model.actuator_trnid[i, 0])
 
     def _route(self, tendon: int, same_name: bool) -> Table:
         """Return the path of a tendon; if it has another name, the joints that it crosses and that bend it."""
@@ -185,16 +186,6 @@ class ActuatorReader(ElementReader):
         pieces = range(int(model.tendon_adr[tendon]), int(model.tendon_adr[tendon] + model.tendon_num[tendon]))
         fixed = model.wrap_type[pieces[0]] == self.mujoco.mjtWrap.mjWRAP_JOINT
         return {int(model.wrap_objid[k]): float(model.wrap_prm[k]) for k in pieces} if fixed else {}
-
-    def _target_problem(self, i: int) -> str | None:
-        """Return the reason against carrying an actuator's target or computation over, or None."""
-        model, mujoco = self.model, self.mujoco
-        target = mujoco.mjtTrn(int(model.actuator_trntype[i])).name.removeprefix("mjTRN_").lower()
-        if target not in ("joint", "jointinparent", "tendon"):
-            return f"it drives a {target}"
-        if target != "tendon" and model.jnt_type[model.actuator_trnid[i, 0]] == mujoco.mjtJoint.mjJNT_FREE:
-            return "it drives a free joint"
-        return None
 
     def _law(self, i: int) -> Table | str:
         """Return an actuator's law as in `laws`, or the reason for its lack."""

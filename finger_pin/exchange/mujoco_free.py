@@ -45,7 +45,15 @@ class FreeBodies:
         self.converted = [i for i in joints if trees[i] & joined or self._has_several_geoms(trees[i])]
         for i in self.converted:
             condition = "its middle hinge of three must not come to a right angle"
-            reader.left_out.add(f"free body {self.names.bodies[int(model.jnt_bodyid[i])]}: {condition}", moves=False)
+            name, dofs = (
+                self.names.bodies[int(model.jnt_bodyid[i])],
+                slice(*(int(model.jnt_dofadr[i]) + np.array([0, 6]))),
+            )
+            reader.left_out.add(f"free body {name}: {condition}", moves=False)
+            if np.any(model.dof_damping[dofs]) or np.any(model.dof_armature[dofs]):
+                reader.left_out.add(f"free body {name}: damping and armature are those of its slides and hinges")
+            if np.any(model.dof_frictionloss[dofs]):
+                reader.left_out.add(f"free body {name}: friction loss")
         used = {*self.names.joints}
         bodies = model.jnt_bodyid[self.converted].tolist()
         self.labels = {body: _labels(self.names.bodies[body], used) for body in bodies}

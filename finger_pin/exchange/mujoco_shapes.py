@@ -107,7 +107,7 @@ class Shapes:
             elif not self._overlaps_body(geoms[0]):
                 (i,) = geoms
                 self._object_names[i] = unused_name(name, used | {*objects}, "object")
-                moving = {"mass": float(model.body_mass[body]), **self._velocity(data, i)}
+                moving = {"mass": float(model.body_mass[body]), **self._velocity(data, i), **self._damping(body, i)}
                 objects[self._object_names[i]] = self._shape(i) | self._pose(data, i) | moving
                 objects[self._object_names[i]] |= self._inertia(body, i, objects[self._object_names[i]])
                 self._list_free(body)
@@ -156,13 +156,23 @@ class Shapes:
         products = moments[np.triu_indices(3, 1)].tolist()
         return {"centre": centre.tolist(), "inertia": [*np.diag(moments).tolist(), *products]}
 
+    def _damping(self, body: int, i: int) -> Table:
+        """Return the damping of a free body, which acts on its origin: none where the geom's middle is elsewhere."""
+        rates = self.model.dof_damping[int(self.model.body_dofadr[body]) :][:6].reshape(2, 3)
+        (linear, angular), aside = rates[:, 0].tolist(), np.any(np.abs(self.model.geom_pos[i]) > _INERTIA_TOLERANCE)
+        if np.any(np.ptp(rates, axis=1)) or (linear and aside):
+            self.left_out.add(
+                f"free body {self.names.bodies[body]}: damping at another point than the middle of its geom"
+            )
+            return {}
+        return {key: each for key, each in (("damping", linear), ("angular_damping", angular)) if each}
+
     def _list_free(self, body: int) -> None:
         """List properties of a free body that objects lack."""
         model, name, first = self.model, self.names.bodies[body], int(self.model.body_dofadr[body])
         dofs, joint = slice(first, first + 6), int(model.body_jntadr[body])
         for what, values in (
             ("gravity compensation", model.body_gravcomp[body]),
-            ("damping", model.dof_damping[dofs]),
             ("armature", model.dof_armature[dofs]),
             ("friction loss", model.dof_frictionloss[dofs]),
             ("a spring", model.jnt_stiffness[joint]),

@@ -10,16 +10,18 @@ from finger_pin.description.validation import validate
 from finger_pin.description.waypoints import Waypoint, points_inside_wraps
 from finger_pin.exchange.mujoco_compliance import soft_spring
 from finger_pin.exchange.mujoco_names import Table, distinct, quaternion
+from finger_pin.exchange.mujoco_sites import actuated_sites
 from finger_pin.exchange.mujoco_unsupported import ElementReader, within_margin
 from finger_pin.typing import Array
 
 
 def passed_bodies(reader: ElementReader, sides: bool = False) -> set[int]:
-    """Return the bodies that tendons pass or whose geoms they wrap, and those that have side sites if asked for."""
+    """Return the bodies that tendons pass, wrap or actuators push at sites; those with side sites if asked for."""
     model, types = reader.model, reader.mujoco.mjtWrap
     wraps = np.isin(model.wrap_type, [int(each) for each in (types.mjWRAP_SPHERE, types.mjWRAP_CYLINDER)])
     sites = model.wrap_objid[model.wrap_type == types.mjWRAP_SITE].tolist()
     sites += [int(site) for site in model.wrap_prm[wraps] if sides and site >= 0]
+    sites += actuated_sites(reader)
     return {int(body) for body in (*model.site_bodyid[sites], *model.geom_bodyid[model.wrap_objid[wraps]])}
 
 

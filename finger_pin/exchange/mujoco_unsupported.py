@@ -207,6 +207,8 @@ def _add_actuator_inertia(mujoco: Any, model: Any) -> None:
         target, ratio = int(model.actuator_trnid[i, 0]), float(model.actuator_gear[i, 0]) ** 2
         if model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_TENDON:
             damping, armature = model.tendon_damping, model.tendon_armature
+        elif model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_SITE:
+            continue
         elif model.jnt_type[target] != mujoco.mjtJoint.mjJNT_FREE:
             damping, armature, target = model.dof_damping, model.dof_armature, int(model.jnt_dofadr[target])
         else:

@@ -12,15 +12,19 @@ from finger_pin.description.caching import memoised
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.links import link_body
 from finger_pin.description.objects import Object
+from finger_pin.description.tree_actuators import Wrench
 from finger_pin.exceptions import InputError
+from finger_pin.laws.spring import JOINT_SPRING
 from finger_pin.mechanism.body_places import Placed
 from finger_pin.mechanism.contact_rows import check_start, contact_rows
 from finger_pin.mechanism.evaluation import ContactPoints
 from finger_pin.mechanism.mechanism import Mechanism
+from finger_pin.mechanism.path_elements import PathTerm
 from finger_pin.mechanism.rigid_body import RigidBody
-from finger_pin.mechanism.rows import Rows
+from finger_pin.mechanism.rows import Energy, Rows
 from finger_pin.mechanism.solids import WORLD, add_free_objects, body_solids, object_solids, pairs_apart, pairs_within
 from finger_pin.mechanism.state import State
+from finger_pin.mechanism.wrenches import wrench_legs
 from finger_pin.typing import Array
 
 #: Numbers of a free object's pose (position, quaternion), and of its velocity.
@@ -103,6 +107,10 @@ class Scene:
         extended = add_free_objects(mechanism.body, objects, hand.palm if hand and mechanism.moved else None)
         free = {name: obj for name, obj in objects.items() if extended.model.existJointName(f"{name}_attitude")}
         for name, obj in free.items():
+            if (obj.damping or obj.angular_damping) and mechanism.moved:
+                entry = "damping" if obj.damping else "angular_damping"
+                allowed = "is for a palm at rest, in whose frame speeds are: leave out hand.palm.path"
+                raise InputError(f"environment.objects.{name}.{entry}", allowed, getattr(obj, entry))
             if obj.path and mechanism.moved:
                 raise InputError(f"environment.objects.{name}.path", "is for a palm at rest; leave out hand.palm.path")
         width = int(extended.model.nv) + len(mechanism.lumps)
@@ -153,7 +161,30 @@ class Scene:
         on_paths = [joints + VELOCITY * index for index, each in enumerate(self.free.values()) if each.mass is None]
         for number, first in enumerate(on_paths):
             prescribed[first : first + VELOCITY] = before + VELOCITY * number + np.arange(VELOCITY)
-        return Mechanism(self.body, [self.contacts, *rows], *kept, prescribed, mechanism.tendons)
+        dampers = self._dampers(joints, width)
+        return Mechanism(self.body, [self.contacts, *rows, *dampers], *kept, prescribed, mechanism.tendons)
+
+    def _dampers(self, first: int, width: int) -> list[Rows]:
+        """Return the table of dampers of free objects, whose coordinates begin at a given one, if there are any."""
+        names, numbers, arms, paths = list[str](), list[float](), list[Array](), list[tuple[PathTerm, ...]]()
+        for k, (name, each) in enumerate(self.free.items()):
+            body: dict[str | None, Placed] = {
+                name: Placed(int(self.body.model.getJointId(f"{name}_attitude")), pin.SE3.Identity())
+            }
+            for axis, unit, arm in zip("xyz", np.eye(3), np.eye(3, width, first + VELOCITY * k), strict=True):
+                if each.damping:
+                    names, numbers = [*names, f"{name}.{axis}"], [*numbers, each.damping]
+                    arms, paths = [*arms, arm], [*paths, ()]
+                if each.angular_damping:
+                    # Within a step, coordinates of attitudes are angles about three axes, not turns about the body's.
+                    about = wrench_legs(body, Wrench(body=name, torque=tuple(unit.tolist())), 1.0)
+                    names, numbers = [*names, f"{name}.about_{axis}"], [*numbers, each.angular_damping]
+                    arms, paths = [*arms, np.zeros(width)], [*paths, about]
+        damping, powers = np.array(numbers), (Energy("object_damping", "dampers of free objects"),)
+        rest, stored = np.zeros_like(damping), self.contacts.stored
+        parameters = np.array([rest, rest, damping])
+        table = ("object_damping", JOINT_SPRING, tuple(names), parameters)
+        return [Rows(*table, np.array(arms), paths=tuple(paths), stored=stored, powers=powers)] if names else []
 
     @property
     def world(self) -> tuple[str, ...]:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.routing import Routing
 from finger_pin.description.validation import expand
+from finger_pin.laws.cogging import COGGING
 from finger_pin.laws.gearbox import GEARBOX
 from finger_pin.laws.limiter import STROKE_LIMITER
 from finger_pin.laws.motor import MOTOR
@@ -32,6 +33,7 @@ from finger_pin.typing import Array
 _STRETCH_ENERGY = Energy("elastic_tendons", "tendons on spools")
 _DAMPING = Energy("elastic_damping", "tendons stretching")
 _FLANKS = Energy("backlash", "flanks of gears with play")
+_COGGING = Energy("cogging", "cogging of motors")
 # Of a motor with play: the spool's part of its inertia, stiffness of flanks over that of bristles, and their c, s/rad.
 _SPOOL_INERTIA_SHARE, _FLANK_STIFFNESS_RATIO, _FLANK_DAMPING = 1e-4, 10.0, 1.0
 
@@ -55,6 +57,7 @@ class Actuators:
         gearbox: Numbers of the law of gearboxes, shape (parameters, m).
         external_weight: x, shape (m,).
         backlash: b, shape (m,), rad.
+        cogging: Numbers of the law of cogging, shape (parameters, m); zero of motors without.
     """
 
     routing: Routing
@@ -71,6 +74,7 @@ class Actuators:
     gearbox: Array
     external_weight: Array
     backlash: Array
+    cogging: Array
 
     @classmethod
     def from_description(cls, description: FingerDescription, routing: Routing) -> Actuators:
@@ -122,6 +126,14 @@ class Actuators:
             gearbox=np.array(gearboxes).reshape(-1, len(GEARBOX.parameters)).T,
             external_weight=np.array([each.motor.friction.external_weight for each in actuators]),
             backlash=np.array([each.motor.friction.backlash for each in actuators]),
+            cogging=np.array(
+                [
+                    (each.amplitude, each.per_turn, each.phase) if each else (0.0, 0.0, 0.0)
+                    for each in (actuator.motor.cogging for actuator in actuators)
+                ]
+            )
+            .reshape(-1, len(COGGING.parameters))
+            .T,
         )
 
     @property
@@ -224,12 +236,16 @@ class Actuators:
         return [elastic, *hysteresis_rows("tendon_hysteresis", elastic, self.hysteresis, OF_TENDONS, _DAMPING)]
 
     def rotor_rows(self, width: int) -> list[Rows]:
-        """Return the tables of motors, of the play of gears, and of gearboxes."""
+        """Return the tables of motors, of their cogging, of the play of gears, and of gearboxes."""
         if not self.names:
             return []
         count = len(self.names)
         turns = np.eye(count, width, width - count)
         one_way = bool(np.any(self.gearbox[-2:]))
+        cogged = np.flatnonzero(self.cogging[COGGING.parameters.index("per_turn")])
+        names = tuple(self.names[motor] for motor in cogged)
+        cogging = [Rows("cogging", COGGING, names, self.cogging[:, cogged], turns[cogged], stored=_COGGING)]
+        on_rotors = {"motors": np.eye(count)} | ({"cogging": np.eye(count)[:, cogged]} if names else {})
         return [
             Rows(
                 "motors",
@@ -240,6 +256,7 @@ class Actuators:
                 channels=self.channels,
                 powers=(Energy("electrical", "motors' electronics"), Energy("motor_heat", "heat in windings")),
             ),
+            *(cogging if names else []),
             *self._play(width),
             Rows(
                 "gearboxes",
@@ -248,7 +265,7 @@ class Actuators:
                 self.gearbox,
                 turns,
                 inputs=self._torques(np.ones(count)) if one_way else {},
-                loads={"motors": np.eye(count), **self._torques(self.external_weight)},
+                loads={**on_rotors, **self._torques(self.external_weight)},
                 stored=Energy("gearboxes", "gear bristles"),
                 powers=(Energy("gearbox_coulomb", "gears sliding"), Energy("gearbox_viscous", "gears viscous")),
             ),

@@ -27,6 +27,7 @@ from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows
 from finger_pin.mechanism.spans import ANGLE, RISE
 from finger_pin.mechanism.tendon_paths import TendonPaths
+from finger_pin.mechanism.wrenches import wrench_legs
 from finger_pin.typing import Array
 
 # Dry friction of a tendon holds until it has slid so far, m.
@@ -97,13 +98,10 @@ def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -
     for group in ACTUATORS:
         actuators = {name: each for name, each in tree.actuators.items() if actuator_table(each) == group}
         if actuators:
-            pulled = (
-                _about(each.joint) if each.joint else routes.cords[str(each.tendon)] for each in actuators.values()
-            )
-            along = routes.along(pulled, [each.gear for each in actuators.values()])
+            arms, paths = zip(*(_driven(each, routes) for each in actuators.values()), strict=True)
             channels = first + np.array([list(tree.actuators).index(name) for name in actuators])
             parameters = [_actuator(each) for each in actuators.values()]
-            tables.append(table(group, actuators, parameters, along, channels=channels))
+            tables.append(table(group, actuators, parameters, (np.vstack(arms), paths), channels=channels))
     return tables
 
 
@@ -114,6 +112,16 @@ _Described = tuple[str, Collection[str], _Numbers, tuple[Array, Paths]]
 def _about(joint: str, radius: float = -1.0) -> Cord:
     """Return a cord about one joint, by default as long as the joint's coordinate."""
     return Cord((CordElement(joint, frozenset({joint}), radius),))
+
+
+def _driven(actuator: TreeActuator, routes: TendonPaths) -> tuple[Array, Sequence[PathTerm]]:
+    """Return the arm of what an actuator drives, shape (n,), and its path."""
+    if actuator.wrench:
+        legs = wrench_legs(routes.placed, actuator.wrench, actuator.gear)
+        return np.zeros(len(routes.description.joints)), legs
+    cord = _about(actuator.joint) if actuator.joint else routes.cords[str(actuator.tendon)]
+    (arm,), (path,) = routes.along([cord], actuator.gear)
+    return arm, path
 
 
 def _tendons(tree: Tree, routes: TendonPaths) -> list[_Described]:

@@ -113,7 +113,7 @@ def test_directions_that_are_rounded_have_length_1():
         ("tree__tendons__sum__joints", {"elbow": 1.0}, "no such joint; there are hinge"),
         ("tree__tendons__sum__range", [1.0, 0.0], "the least length must be below the largest"),
         ("tree__tendons__sum__rest", [1.0, 0.0], "the first length must not be above the second"),
-        ("tree__actuators__motor__joint", "hinge", "drives a joint or a tendon, and not both"),
+        ("tree__actuators__motor__joint", "hinge", "drives one of joint, tendon and wrench"),
         ("tree__actuators__motor__force_range", [1.0, 0.0], "the lower limit must not be above the upper one"),
         ("tree__couplings__held__other", "knee", "no such joint; there are hinge"),
         ("tree__tip", {"body": "nail"}, "no such body"),

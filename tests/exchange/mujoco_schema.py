@@ -10,9 +10,9 @@ ALL = "*"
 # Names, groups, colours and classes, of any element.
 _NO_EFFECT = "name class childclass group user rgba material"
 _POSE = "pos quat axisangle euler xyaxes zaxis"
-_TRANSMISSION = "armature damping delay gear joint jointinparent tendon"
-# What drives something else than a joint or tendon is listed as a whole.
-_ELSEWHERE = "site refsite slidersite cranksite cranklength"
+_TRANSMISSION = "armature damping delay gear joint jointinparent refsite site tendon"
+# What drives something else is listed as a whole.
+_ELSEWHERE = "slidersite cranksite cranklength"
 _DRIVEN = {
     "carried": f"{_TRANSMISSION} ctrllimited ctrlrange forcelimited forcerange",
     "listed": _ELSEWHERE,

@@ -209,10 +209,10 @@ class SteadyReadings(RecordingModel):
         tensions = {each.partition(".")[2] for each in self.recording.inputs if each.startswith("spool_tension.")}
         for motor, actuator in self.scenario.finger.actuators.items():
             tendon = actuator.tendons[0]
-            if actuator.drive == "position" and not {*actuator.tendons} <= {*self.wound_tendons.values()} | tensions:
-                allowed = (
-                    f"lack what {motor} in position drive rests at: spool_angle.{motor}, or spool_tension.{tendon}"
-                )
+            told = {*actuator.tendons} <= {*self.wound_tendons.values()} | tensions
+            if (actuator.drive == "position" or actuator.motor.cogging) and not told:
+                why = "in position drive" if actuator.drive == "position" else "with cogging"
+                allowed = f"lack what {motor} {why} rests at: spool_angle.{motor}, or spool_tension.{tendon}"
                 raise InputError(f"{self._entry}.inputs", allowed)
 
     def _wound_tendon(self, finger: FingerDescription, name: str) -> str:
@@ -228,12 +228,13 @@ class SteadyReadings(RecordingModel):
             f'drive = "{actuator.drive}"': actuator.drive != "position",
             "several cords": len(actuator.tendons) > 1,
             "motor.friction.backlash": actuator.motor.friction.backlash > 0.0,
+            "motor.cogging": actuator.motor.cogging is not None,
             "position_loop.torque_off": actuator.position_loop.torque_off is not None,
         }
         unsupported = " and ".join(what for what, there in reasons.items() if there)
         if unsupported:
             allowed = (
-                f'tells no rest: finger.actuators.{motor} must have drive = "position", one cord, gears without play'
+                f'tells no rest: finger.actuators.{motor} must have drive = "position", one cord, no play, no cogging'
             )
             raise InputError(f"{self._entry}.inputs.{name}", f"{allowed}, and no torque_off; it has {unsupported}")
         return actuator.tendons[0]
