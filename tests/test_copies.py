@@ -110,6 +110,20 @@ def acted(environment):
     return found + ([*environment.result().tendon_tension.values.ravel()] if alone else [])
 
 
+def observer():
+    made = fp.observe("wound", sensors={"motor_current.servo": {"noise": 1e-3}})
+    observed(made)
+    return made
+
+
+def observed(observer):
+    """What is estimated while the servo winds its cord in."""
+    readings = [{"motor_position.servo": 0.02 * k, "motor_current.servo": 0.1} for k in range(20)]
+    found = [each for reading in readings for each in observer.step(reading).variables().values()]
+    return [*np.concatenate([np.ravel(each) for each in found]), *observer.result().consistency.values]
+
+
+ESTIMATED = ["joint_position", "estimated.joint_position", "estimated.tendon_tension_high"]
 ACTION = {"observation": {"joint_position": Sensor(noise=0.01), "tendon_tension": Sensor(delay=0.02)}, "delay": 0.005}
 VECTOR = partial(VectorEnvironment, 2)
 # Of everything public: what makes one that is under way, and what then asks it for numbers.
@@ -130,6 +144,11 @@ OBJECTS = {
     "environment, numbers drawn": (partial(environment, randomise=DRAWN, **ACTION), acted),
     "environment, motors, numbers drawn": (
         partial(environment, "servo_position", action="motor_position", randomise=RUBBING),
+        acted,
+    ),
+    "observer": (observer, observed),
+    "environment with an observer": (
+        partial(environment, "wound", action="spool_angle", observation=ESTIMATED, randomise=RUBBING),
         acted,
     ),
     "worlds, numbers drawn": (partial(environment, make=VECTOR, randomise=DRAWN, **ACTION), acted),

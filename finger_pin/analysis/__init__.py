@@ -14,6 +14,7 @@ from finger_pin.analysis.polytope import ForcePolytope, force_polytope
 from finger_pin.analysis.servo_limits import gear_shares, tension_limits
 from finger_pin.analysis.spring_return import SpringReturn, spring_return
 from finger_pin.analysis.steady import SteadyState, rubbing_cords, settled_posture, steady_state
+from finger_pin.analysis.taut_posture import taut_posture
 from finger_pin.analysis.tip_force import RequiredTension, largest_force, tension_for_force
 from finger_pin.analysis.tip_statics import Friction
 
@@ -48,6 +49,7 @@ __all__ = [
     "settled_posture",
     "spring_return",
     "steady_state",
+    "taut_posture",
     "tension_for_force",
     "tension_limits",
 ]

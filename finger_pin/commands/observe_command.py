@@ -32,7 +32,11 @@ if TYPE_CHECKING:
 def observe(
     scenario: ScenarioName,
     log: Annotated[
-        Path, typer.Argument(metavar="LOG", help="CSV file: columns time, motor_position.NAME, motor_current.NAME.")
+        str,
+        typer.Argument(
+            metavar="LOG",
+            help="CSV file: columns time, motor_position.NAME, motor_current.NAME; or a bench, or BENCH:RECORDING.",
+        ),
     ],
     settings: Settings = [],  # noqa: B006
     uncertain: Annotated[
@@ -90,7 +94,7 @@ def observe(
         raise problem
 
 
-def _observe(scenario: Scenario, log: Path, options: dict[str, Any]) -> tuple[xr.Dataset, Interrupted | None]:
+def _observe(scenario: Scenario, log: str, options: dict[str, Any]) -> tuple[xr.Dataset, Interrupted | None]:
     """Return the observation as far as it goes, and the interruption that ended it, or None."""
     from finger_pin.observation.observe import observe
 

@@ -62,6 +62,10 @@ class Environment(gymnasium.Env[NDArray[Any], NDArray[Any]]):
                     or what the joints' ranges need.
                 observation: Names of variables of the result; or for each a `Sensor`, and under names of their own
                     functions, such as the reward is, of what sensors show and ``draw`` returned.
+                    ``estimated.`` before a name of `fp.observe`'s result, ``estimated.joint_position_low``, is what an
+                    observer of the scenario, which knows no draw, makes of ``motor_position`` and ``motor_current``.
+                observer: Arguments of that observer, as of `fp.observe`: ``uncertain``, ``sensors``, ``forces``,
+                    ``period``, ``level``.
                 privileged: Variables that the policy does not see, for rewards, critics and logs.
                 done: A function of the signals: whether the task has ended (terminated).
                 period: Of control, s.

@@ -41,6 +41,7 @@ class Task:
     delay: float = 0.0
     duration: float = 2.0
     draw: Callable[[np.random.Generator], Mapping[str, ArrayLike]] | None = None
+    observer: Mapping[str, Any] = field(default_factory=dict)
     start: str | Callable[[np.random.Generator], ArrayLike] = "reference"
     randomise: Mapping[str, Distribution] | str | os.PathLike[str] = field(default_factory=dict)
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from finger_pin.description.loading import ScenarioLike
 from finger_pin.description.validation import choices
 from finger_pin.exceptions import InputError
+from finger_pin.learning.estimates import PREFIX, estimates_of
 from finger_pin.learning.sensors import measurements
 from finger_pin.learning.task import Task, all_finite
 from finger_pin.learning.world import World
@@ -34,12 +35,14 @@ class Worlds:
         """Build the worlds."""
         world_template = World.from_scenario(scenario, task, finger)
         self.task, self.worlds = task, [world_template, *(world_template.twin() for _ in range(count - 1))]
+        self._estimates = estimates_of([world.simulator for world in self.worlds], task)
         available = instant_variables(world_template.simulator.loop)
-        for name in task.variables:
+        self._true = [name for name in task.variables if not name.startswith(PREFIX)]
+        for name in self._true:
             if name not in available:
                 entry = "observation" if name in task.sensors else "privileged"
                 raise InputError(entry, f"no such variable; there are {choices(name, available)}", name)
-        self._instants = Instants([world.simulator for world in self.worlds], task.variables)
+        self._instants = Instants([world.simulator for world in self.worlds], self._true)
         self._measurements = measurements(task.sensors, count, task.period)
         self._context: dict[str, Array] = {}
         self._randoms = [np.random.default_rng(0)] * count
@@ -70,6 +73,8 @@ class Worlds:
                 if name not in self._context:
                     self._context[name] = np.zeros((len(self.worlds), *value.shape))
                 self._context[name][i] = value
+        if self._estimates:
+            self._estimates.reset(indices, [world.sensors for world in self.worlds], self._randoms)
 
     def act(self, actions: Array, indices: Sequence[int]) -> None:
         """Act in some worlds for a control period, shape (w, k).
@@ -78,18 +83,23 @@ class Worlds:
         """
         for i in indices:
             self.worlds[i].act(actions[i])
-        acting = [self.worlds[i] for i in indices]
+        acting = list(indices)
         while acting:
-            inputs, lengths = zip(*[world.next_piece() for world in acting], strict=True)
-            advance([world.simulator for world in acting], inputs, lengths)
-            acting = [world for world in acting if world.is_acting]
+            inputs, whole = zip(*[self.worlds[i].next_piece() for i in acting], strict=True)
+            lengths = self._estimates.cut(acting, whole) if self._estimates else whole
+            advance([self.worlds[i].simulator for i in acting], inputs, lengths)
+            if self._estimates:
+                self._estimates.follow(acting, self._randoms)
+            acting = [i for i in acting if self.worlds[i].is_acting]
 
     def observe(self, indices: _Indices, *, for_reward: bool = True) -> tuple[NDArray[np.float32], dict[str, Array]]:
         """Return the observations in some worlds, shape (k, o), and the true signals in all by name, shapes (w, ...).
 
         Without ``for_reward`` signals are only those that sensors read.
         """
-        signals = self._instants.read(None if for_reward else list(self.task.sensors))
+        read = [name for name in self._true if for_reward or name in self.task.sensors]
+        signals = self._instants.read(read) if read else {}
+        signals |= self._estimates.values() if self._estimates else {}
         count = len(indices)
         all_worlds = count == len(self.worlds)
         observations = {name: value if all_worlds else value[indices] for name, value in self._context.items()}

@@ -12,6 +12,8 @@ from finger_pin.typing import Array
 
 #: Signals of which bands follow from the rest of the estimate.
 TENSIONS = ("tendon_tension", "spool_tension")
+#: What has a band.
+QUANTITIES = ("joint_position", *TENSIONS, "fingertip_force")
 
 
 class Band(NamedTuple):
@@ -58,3 +60,11 @@ class Estimate:
     observable: dict[str, Array]
     skipped: tuple[str, ...]
     failure: str
+
+    def variables(self) -> dict[str, Array]:
+        """Return quantities with the ends of their bands, touch and consistency, by the names of a result."""
+        values = {"touched": self.touched.astype(float), "consistency": np.array([self.consistency])}
+        for name in QUANTITIES:
+            if (band := getattr(self, name)) is not None:
+                values |= {f"{name}{suffix}": end for suffix, end in zip(("", "_low", "_high"), band, strict=True)}
+        return values

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from finger_pin.analysis import taut_posture
+from finger_pin.description.scenario import Scenario
 from finger_pin.description.validation import choices
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
@@ -20,6 +22,9 @@ _START_ANGLE, _START_SPEED, _START_BRISTLE = 0.01, 1e-3, 0.5
 # What the model errs by in the root of a second: angles, rad, speeds of joints and of motors, rad/s, bristles over
 # their scale.
 _ANGLE, _SPEED, _MOTOR_SPEED, _BRISTLE = 1e-3, 0.1, 0.5, 0.3
+# Motors that are farther from where the scenario starts, rad, tell another posture, which friction shifts by about so
+# much where cords leave it open, rad.
+_ELSEWHERE, _OPEN = 0.01, 0.15
 
 
 def assumed_forces(tips: Sequence[str], forces: Iterable[str] | Mapping[str, float]) -> tuple[NDArray[np.int64], Array]:
@@ -54,6 +59,33 @@ def period_noise(finger: Finger, force_deviation: Array, h: float) -> tuple[Arra
     rates[2 * width - len(finger.actuators.names) : 2 * width] = _MOTOR_SPEED
     decay = np.full(len(force_deviation), np.exp(-h / _FORCE_TIME))
     return np.concatenate([rates**2 * h, force_deviation**2 * (1.0 - decay**2)]), decay
+
+
+def start_state(
+    scenario: Scenario, finger: Finger, x: Array, motors: Mapping[str, float], position: ArrayLike | None
+) -> tuple[Array, Array]:
+    """Return the packed state at rest, shape (size,), and the covariance of angles that motors leave open, (n, n).
+
+    Args:
+        scenario: The scenario.
+        finger: Its finger.
+        x: Where the scenario starts, packed; it is overwritten.
+        motors: By motor theta_m, rad; others wind their tendons just taut.
+        position: theta, shape (n,), rad; by default that which the motors tell.
+
+    Raises:
+        InputError: Naming a motor that is none, or an angle that is not finite.
+    """
+    theta, names = finger.layout.unpack(x).position, finger.actuators.names
+    rest = dict(zip(names, finger.layout.unpack(x).motor_position.tolist(), strict=True))
+    free = np.zeros((len(theta), len(theta)))
+    if position is not None and motors.keys() <= rest.keys():
+        x = finger.rest_state(np.asarray(position, dtype=float))
+    elif not all(abs(angle - rest.get(name, np.nan)) <= _ELSEWHERE for name, angle in motors.items()):
+        theta, free = taut_posture(finger, motors, theta, scenario.coupling(finger.routing))
+        x = finger.rest_state(theta)
+    finger.layout.unpack(x).motor_position[[names.index(name) for name in motors]] = [*motors.values()]
+    return x, _OPEN**2 * free @ free.T
 
 
 def start_covariance(finger: Finger, sensors: Sensors, levels: Array) -> Array:

@@ -8,7 +8,8 @@ import numpy as np
 import xarray as xr
 
 from finger_pin.cancellation import CancelToken, Stop
-from finger_pin.description.loading import ScenarioLike
+from finger_pin.description.loading import ScenarioLike, load_scenario
+from finger_pin.description.recordings.motions import find_recording
 from finger_pin.exceptions import Interrupted
 from finger_pin.observation.observer import Observer
 from finger_pin.observation.readings import ReadingsLike, read_readings, regular
@@ -38,8 +39,9 @@ def observe(
         scenario: A scenario, its name, or the path of its file.
         readings: A CSV file with the columns ``time``, s, ``motor_position.NAME``, rad, ``motor_current.NAME``, A, and
             so on, with or without a unit behind the name; a table with its ``path``, ``time`` and ``columns`` where
-            it has other names or scales, as a signal's file in a scenario; or times, shape (m,), and columns by name,
-            shape (m,), in SI. Cells may be empty.
+            it has other names or scales, as a signal's file in a scenario; motors and inputs of a recording of a bench,
+            ``BENCH`` or ``BENCH:RECORDING``, with the values that hold for it alone; or times, shape (m,), and columns
+            by name, shape (m,), in SI. Cells may be empty.
         uncertain: By key of the scenario the standard deviation of a number as a part of it; or the result of an
             identification, whose intervals count. By default 10 % of frictions, springs and stiffnesses, and 2 % of
             radii.
@@ -57,10 +59,12 @@ def observe(
         InputError: Naming the argument that is wrong.
         Interrupted: After Ctrl-C or such a stop, with what was observed.
     """
+    if recording := find_recording("readings", readings):
+        scenario = load_scenario(scenario, recording.values)
     observer = Observer(scenario, uncertain=uncertain, sensors=sensors, forces=forces, period=period, level=level)
     if readings is None:
         return observer
-    times, columns, left_out = read_readings(readings, observer.sensors)
+    times, columns, left_out = read_readings(recording or readings, observer.sensors)
     rows, backward = regular(times)
     names, table = list(columns), np.column_stack([*columns.values()])[rows]
     first = {name.removeprefix("motor_position."): float(values[rows[0]]) for name, values in columns.items()}

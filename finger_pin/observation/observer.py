@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import time
 from collections.abc import Iterable, Mapping
+from functools import partial
+from typing import Any
 
 import numpy as np
 import scipy.stats
@@ -13,13 +16,12 @@ from numpy.typing import ArrayLike
 from finger_pin.core.jit import pack
 from finger_pin.core.stepping.period_map import PeriodMap
 from finger_pin.description.loading import ScenarioLike, load_scenario, to_toml
-from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.coerce import as_packed
 from finger_pin.mechanism.finger import Finger
 from finger_pin.observation.estimate import TENSIONS, Band, Estimate
 from finger_pin.observation.filter import FILTER_ARGS, JUMP, FilterArgs, correct, predict, spread
-from finger_pin.observation.noise import assumed_forces, hidden_tension, period_noise, start_covariance
+from finger_pin.observation.noise import assumed_forces, hidden_tension, period_noise, start_covariance, start_state
 from finger_pin.observation.record import Record
 from finger_pin.observation.sensors import Sensors
 from finger_pin.observation.touch import TouchMonitor
@@ -48,6 +50,8 @@ class Observer:
         sensors: What may be read.
         period: s.
         level: Of the bands.
+        tips: At which forces are estimated; empty of a finger's only one.
+        removed: Names of the scenario's objects, which the model does not have.
     """
 
     def __init__(
@@ -61,13 +65,15 @@ class Observer:
         level: float = 0.95,
     ) -> None:
         """Make a model of a scenario's finger, and start at rest where the scenario does; see `observe`."""
-        loaded = load_scenario(scenario)
+        loaded, forces = load_scenario(scenario), forces if isinstance(forces, Mapping) else tuple(forces)
+        self._again = partial(type(self), loaded, uncertain=uncertain, sensors=sensors, forces=forces)
+        self._again.keywords.update(period=period, level=level)
         if not 0.0 < period <= 0.1:
             raise InputError("period", "must be above 0 and at most 0.1 s", period)
         if not 0.0 < level < 1.0:
             raise InputError("level", "must be above 0 and below 1", level)
         # What surrounds the finger is not known to it.
-        loaded = loaded.updated(environment={"objects": {}})
+        self.removed, loaded = tuple(loaded.environment.objects or ()), loaded.updated(environment={"objects": {}})
         finger = self.finger = Finger(loaded.finger)
         self.scenario, self.period, self.level = loaded, float(period), float(level)
         self.uncertainty = Uncertainty.from_scenario(loaded, finger, uncertain)
@@ -75,10 +81,10 @@ class Observer:
         self._periods = PeriodMap(
             finger, self._rest, self.uncertainty.varied, currents=True, rtol=_TOLERANCE, atol_scale=_TOLERANCE
         )
-        self._tips = finger.description.tree.tip_names or (tuple(loaded.hand.fingers) if loaded.hand else ("",))
-        self._force_at, self._force_deviation = assumed_forces(self._tips, forces)
-        self._force_names = [self._tips[k // 3] for k in self._force_at[::3]]
-        names = [f"fingertip_force.{self._tips[k // 3]}.{'xyz'[k % 3]}".replace("..", ".") for k in self._force_at]
+        tips = finger.description.tree.tip_names or (tuple(loaded.hand.fingers) if loaded.hand else ("",))
+        self._force_at, self._force_deviation = assumed_forces(tips, forces)
+        self.tips = tuple(tips[k // 3] for k in self._force_at[::3])
+        names = [f"fingertip_force.{tips[k // 3]}.{'xyz'[k % 3]}".replace("..", ".") for k in self._force_at]
         self.sensors = Sensors.from_finger(finger, names, sensors)
         self._quantile = float(scipy.stats.norm.ppf(0.5 + 0.5 * level))
         watched = [name for name in TENSIONS if name in finger.signal_table]
@@ -137,12 +143,12 @@ class Observer:
         *,
         state: ArrayLike | None = None,
         covariance: ArrayLike | None = None,
-    ) -> None:
-        """Start at rest at time zero, with a new record.
+    ) -> Estimate:
+        """Start at rest at time zero, with a new record; return the estimate there.
 
         Args:
             motor_position: By motor theta_m, rad; others wind their tendons just taut.
-            position: theta, shape (n,), rad; by default where the scenario's finger starts.
+            position: theta, shape (n,), rad; by default where the scenario's finger starts, or what the motors tell.
             state: Packed state, shape (size,), in place of both.
             covariance: Of the state, shape (size, size); by default 0.01 rad, and bristles of half their levels.
 
@@ -150,28 +156,23 @@ class Observer:
             InputError: Naming the argument that is wrong.
         """
         finger, periods = self.finger, self._periods
-        size = len(periods.x)
+        size, joints = len(periods.x), len(finger.routing.joints)
         if state is None:
-            x = self._rest.copy() if position is None else finger.rest_state(np.asarray(position, dtype=float))
-            motors = finger.layout.unpack(x).motor_position
-            for name, angle in (motor_position or {}).items():
-                if name not in finger.actuators.names:
-                    raise InputError(
-                        f"motor_position.{name}", f"no such motor{suggestion(name, finger.actuators.names)}"
-                    )
-                motors[finger.actuators.names.index(name)] = angle
+            x, left_open = start_state(self.scenario, finger, self._rest.copy(), motor_position or {}, position)
         else:
-            x = as_packed(finger, state, "state")
-        periods.restart(x)
+            x, left_open = as_packed(finger, state, "state"), np.zeros((joints, joints))
+        periods.restart(x, 0.0)
         periods.inputs[:] = periods.forces[:] = 0.0
         levels = periods.limit_bristles()
         p = self._covariance
         p[:] = 0.0
         p[:size, :size] = start_covariance(finger, self.sensors, levels) if covariance is None else covariance
+        p[:joints, :joints] += left_open if covariance is None else 0.0
         at = np.arange(size, len(p))
         p[at, at] = np.concatenate([self._force_deviation, self.uncertainty.deviations]) ** 2
-        self._begin, self._last, self._missed = periods.time, dict[str, float](), 0
-        self._touch, self._record = TouchMonitor(len(self._force_at) // 3), Record(self.finger, self._force_names)
+        self._last, self._missed = dict[str, float](), 0
+        self._touch, self._record = TouchMonitor(len(self.tips)), Record(finger, self.tips)
+        return self._estimate(self._spread(), (), "")
 
     def step(self, readings: Mapping[str, float], period: float | None = None) -> Estimate:
         """Go on by a period, and correct what is known by the readings at its end.
@@ -194,9 +195,9 @@ class Observer:
         h = whole / pieces
         if self._bound[0] != read or abs(self._bound[1] - h) > 1e-9 * h:
             self._bind(read, h)
-        skipped, failure = list[str](), ""
+        skipped, failure, held = list[str](), "", (self._periods.inputs, self._filter.input_variance)
         for piece in range(pieces):
-            skipped = self._hold(readings, (piece + 0.5) / pieces, 1.0 / pieces)
+            skipped = self.sensors.hold(readings, self._last, (piece + 0.5) / pieces, 1.0 / pieces, *held)
             failure = self._predict(h) or failure
         self._last |= {name: float(readings[name]) for name in self.sensors.inputs if np.isfinite(readings[name])}
         self._filter.readings[:] = [readings[name] for name in read]
@@ -204,27 +205,11 @@ class Observer:
         innovations = self._filter.innovations.tolist()
         skipped += [name for name, each in zip(read, innovations, strict=True) if not abs(each) <= JUMP]
         self._count_missed(taken, len(read))
-        tension = self._periods.watched()[0].copy()
-        spread(self._block.address)
+        tension = self._spread()
         self._touch.follow(innovations, self._filter.distance.tolist(), self.time, whole)
         estimate = self._estimate(tension, tuple(skipped), failure)
         self._record.add(estimate, time.perf_counter() - begin)
         return estimate
-
-    def _hold(self, readings: Mapping[str, float], place: float, share: float) -> list[str]:
-        """Hold every input between its last two readings, at a place in a part of that time; return what is missing."""
-        inputs, variance, missing = self._periods.inputs, self._filter.input_variance, []
-        for name, channel in self.sensors.inputs.items():
-            value, deviation = float(readings[name]), float(self.sensors.input_deviation[channel])
-            last = self._last.get(name, value if np.isfinite(value) else 0.0)
-            inputs[channel], change = last + place * (value - last), share * (value - last)
-            if not np.isfinite(value):
-                # It was something between nothing and twice the last one.
-                missing.append(name)
-                inputs[channel], change = last, 2.0 * last
-            # Between two readings it was anything between them.
-            variance[channel] = deviation**2 + change**2 / 12.0
-        return missing
 
     def _predict(self, h: float) -> str:
         """Predict over a period, s, or go on from the last estimate where that fails; return why it did."""
@@ -241,6 +226,12 @@ class Observer:
             periods.forces[:] = force
             np.einsum("ii->i", self._covariance)[: len(x)] += self._filter.noise[: len(x)]
         return failure
+
+    def _spread(self) -> Array:
+        """Fill what the covariance says of signals; return the tensions that are watched, N."""
+        tension = self._periods.watched()[0].copy()
+        spread(self._block.address)
+        return tension
 
     def _count_missed(self, taken: int, read: int) -> None:
         """Count periods without a reading that fits: after many the estimate is lost."""
@@ -262,18 +253,26 @@ class Observer:
             "level": self.level,
             "period": self.period,
             "uncertain": list(self.uncertainty.keys),
+            "removed_objects": list(self.removed),
         }
         return self._record.dataset(attributes)
 
     @property
-    def _force(self) -> Array:
-        """The forces that are estimated, shape (f, 3), N."""
-        return self._periods.forces.ravel()[self._force_at].reshape(-1, 3)
-
-    @property
     def time(self) -> float:
         """Time from the start, s."""
-        return self._periods.time - self._begin
+        return self._periods.time
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copy by making an equal one in the same state: what compiled code has of it are addresses."""
+        arrays = *self._periods.state_snapshot, self._covariance
+        state = {name: getattr(self, name) for name in ("_last", "_missed", "_touch", "_record")}
+        return self._again, (), copy.deepcopy((arrays, state))
+
+    def __setstate__(self, state: tuple[tuple[Array, ...], dict[str, Any]]) -> None:
+        """Go on from a state."""
+        for own, other in zip((*self._periods.state_snapshot, self._covariance), state[0], strict=True):
+            own[:] = other
+        vars(self).update(state[1])
 
     def _estimate(self, tension: Array, skipped: tuple[str, ...], failure: str) -> Estimate:
         """Return the present estimate."""
@@ -281,13 +280,14 @@ class Observer:
         size, joints, forces = len(periods.x), len(self.finger.routing.joints), len(self._force_at)
         deviation = np.sqrt(np.maximum(self._covariance.diagonal()[: size + forces], 0.0))
         half = np.maximum(quantile * np.sqrt(self._filter.signal_variance), self._hidden - tension)
+        force = periods.forces.ravel()[self._force_at]
         arriving, *entering = zip(tension.reshape(self._each), half.reshape(self._each), strict=True)
         return Estimate(
             time=self.time,
             joint_position=Band.around(periods.x[:joints].copy(), quantile * deviation[:joints]),
             tendon_tension=Band.around(*arriving, 0.0),
             spool_tension=Band.around(*entering[0], 0.0) if entering else None,
-            fingertip_force=Band.around(self._force, quantile * deviation[size:].reshape(-1, 3)),
+            fingertip_force=Band.around(force.reshape(-1, 3), quantile * deviation[size:].reshape(-1, 3)),
             touched=self._touch.touched,
             since=self._touch.since.copy(),
             consistency=self._touch.consistency,

@@ -10,8 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from finger_pin.description.recordings.bench import RecordingSettings
 from finger_pin.description.recordings.columns import SignalFile, Table
 from finger_pin.description.recordings.csv_files import read_columns
+from finger_pin.description.recordings.motions import check_plain, read_motion
 from finger_pin.description.validation import choices, validate
 from finger_pin.exceptions import InputError
 from finger_pin.files import expand
@@ -19,7 +21,7 @@ from finger_pin.observation.sensors import Sensors
 from finger_pin.typing import Array
 
 #: A CSV file with columns ``time`` and ``motor_position.M1``, or a table of `SignalFile` that tells its columns and
-#: units, or times, shape (m,), and columns by name, shape (m,).
+#: units, or a recording, ``BENCH:RECORDING``, or times, shape (m,), and columns by name, shape (m,).
 ReadingsLike = str | os.PathLike[str] | Mapping[str, Any] | tuple[ArrayLike, Mapping[str, ArrayLike]]
 # Units of the quantities that sensors read; of inputs of actuators none is known.
 _UNITS = {
@@ -48,17 +50,26 @@ class Readings(NamedTuple):
     left_out: list[str]
 
 
-def read_readings(source: ReadingsLike, sensors: Sensors) -> Readings:
+def read_readings(source: ReadingsLike | RecordingSettings, sensors: Sensors) -> Readings:
     """Read readings.
 
     Raises:
         InputError: Naming what is wrong.
     """
     known = {*sensors.inputs, *sensors.states}
-    if isinstance(source, tuple):
-        times, named = source
-        columns = {name: np.asarray(values, dtype=float) for name, values in named.items()}
-        times = np.asarray(times, dtype=float)
+    if isinstance(source, RecordingSettings):
+        # Joints and forces of a bench are what estimates are compared with.
+        known = {*sensors.inputs, *(name for name in sensors.states if name.startswith("motor_"))}
+        names = {
+            key: key.replace("tendon_command.", "tensions.").replace("actuator_input.", "inputs.")
+            for key in (*source.inputs, *source.outputs)
+        }
+        units = {key: _UNITS.get(name.partition(".")[0], "") for key, name in names.items() if name in known}
+        times, read = read_motion("readings", source, units)
+        columns = {name: read.get(key, np.zeros(len(times))) for key, name in names.items()}
+    elif isinstance(source, tuple):
+        times = np.asarray(source[0], dtype=float)
+        columns = {name: np.asarray(values, dtype=float) for name, values in source[1].items()}
         for name, values in columns.items():
             if values.shape != times.shape or times.ndim != 1:
                 raise InputError(
@@ -88,6 +99,7 @@ def _read_file(file: SignalFile, known: set[str]) -> tuple[Array, dict[str, Arra
     (_, time), *signals = table.signals(file)
     columns = {}
     for name, column in signals:
+        check_plain(f"readings.{name}", column)
         unit = _UNITS.get(name.partition(".")[0], "")
         columns[name] = table.column(name, column, unit, missing=True) if name in known else np.zeros(table.rows)
     return table.column("time", time, "s", missing=True), columns

@@ -11,14 +11,13 @@ import xarray as xr
 
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.finger import Finger
-from finger_pin.observation.estimate import Band, Estimate
+from finger_pin.observation.estimate import QUANTITIES, Band, Estimate
 from finger_pin.typing import Array
 
 #: From this consistency on a model does not fit its readings.
 CONSISTENCY_LIMIT = 3.0
 # Rows that are kept at most; then every second one goes, and from there on every second estimate is kept.
 _MOST_ROWS = 100_000
-_BANDS = ("joint_position", "tendon_tension", "spool_tension", "fingertip_force")
 _QUANTITIES = {
     "joint_position": ("rad", "joint angle"),
     "tendon_tension": ("N", "tension behind all friction"),
@@ -39,7 +38,7 @@ class Record:
         """
         routing = finger.routing
         self._coordinates = {"joint": list(routing.joints), "tendon": list(routing.tendons), "axis": [*"xyz"]}
-        self._bands = [name for name in _BANDS if name != "spool_tension" or name in finger.signal_table]
+        self._bands = [name for name in QUANTITIES if name != "spool_tension" or name in finger.signal_table]
         self._dims: dict[str, tuple[str, ...]] = {
             "joint_position": ("joint",),
             "tendon_tension": ("tendon",),

@@ -33,12 +33,14 @@ class Sensors:
         input_deviation: Standard deviation of each input, shape (u,).
         states: By name the number of the estimate that it reads: packed state, then forces at tips.
         deviation: Standard deviation of a reading by name.
+        errors: By name of an input or a state ``resolution`` and ``noise``, SI.
     """
 
     inputs: dict[str, int]
     input_deviation: Array
     states: dict[str, int]
     deviation: dict[str, float]
+    errors: dict[str, dict[str, float]]
 
     @classmethod
     def from_finger(
@@ -77,28 +79,48 @@ class Sensors:
                     raise InputError(f"sensors.{name}.{key}", "must be at least 0", value)
         encoders = {f"motor_position.{name}": each.motor.encoder for name, each in finger.description.actuators.items()}
 
-        def deviation(name: str) -> float:
+        def error(name: str) -> dict[str, float]:
             kind = name.partition(".")[0]
             noise = _INPUT_NOISE.get(kind, _CURRENT_NOISE) if name in inputs else _NOISE.get(kind, _FORCE_NOISE)
             encoder = encoders.get(name)
             resolution = (encoder.resolution if encoder else _RESOLUTION) if name in encoders else 0.0
-            each = {"resolution": resolution, "noise": noise} | settings.get(name, {})
-            # A reading is anywhere within a step.
-            return float(np.hypot(each["noise"], each["resolution"] / np.sqrt(12.0)))
+            return {"resolution": resolution, "noise": noise} | settings.get(name, {})
 
+        errors = {name: error(name) for name in (*inputs, *states)}
+        # A reading is anywhere within a step.
+        deviation = {name: np.hypot(each["noise"], each["resolution"] / np.sqrt(12.0)) for name, each in errors.items()}
         of_inputs = np.zeros(finger.mechanism.channels)
         for name, channel in inputs.items():
-            of_inputs[channel] = deviation(name)
-        all_states = {name: deviation(name) for name in states}
-        if exact := [name for name in settings if name in states and all_states[name] == 0.0]:
+            of_inputs[channel] = deviation[name]
+        if exact := [name for name in settings if name in states and deviation[name] == 0.0]:
             raise InputError(
                 f"sensors.{exact[0]}", "must have a resolution or noise: nothing reads exactly", settings[exact[0]]
             )
-        return cls(inputs, of_inputs, states, {name: max(each, 1e-9) for name, each in all_states.items()})
+        return cls(inputs, of_inputs, states, {name: max(float(deviation[name]), 1e-9) for name in states}, errors)
 
     def places(self, names: Iterable[str]) -> NDArray[np.int64]:
         """Return the numbers of the estimate that sensors read, shape (s,)."""
         return np.array([self.states[name] for name in names], dtype=np.int64)
+
+    def hold(
+        self, readings: Mapping[str, float], last: Mapping[str, float], place: float, share: float, *held: Array
+    ) -> list[str]:
+        """Hold every input between its last two readings, at a place in a part of that time; return what is missing.
+
+        Filled are inputs and their variances, shape (u,) each.
+        """
+        missing, (inputs, variance) = [], held
+        for name, channel in self.inputs.items():
+            value, deviation = float(readings[name]), float(self.input_deviation[channel])
+            before = last.get(name, value if np.isfinite(value) else 0.0)
+            inputs[channel], change = before + place * (value - before), share * (value - before)
+            if not np.isfinite(value):
+                # It was something between nothing and twice the last one.
+                missing.append(name)
+                inputs[channel], change = before, 2.0 * before
+            # Between two readings it was anything between them.
+            variance[channel] = deviation**2 + change**2 / 12.0
+        return missing
 
     def check(self, readings: Mapping[str, Any]) -> None:
         """Refuse names that are none, and missing inputs.

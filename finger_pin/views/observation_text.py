@@ -140,8 +140,10 @@ def _consistency(result: xr.Dataset) -> str:
 
 def _dropped(result: xr.Dataset) -> list[str]:
     """Return what was skipped, left out and has failed."""
+    removed = _texts(result, "removed_objects")
+    unknown = [f"Objects of the scenario, unknown to the observer: {', '.join(removed)}"] if removed else []
     named = {"skipped": "Skipped readings", "left_out": "Left out", "failures": "Failed integrations"}
-    return [f"{title}: {', '.join(_texts(result, name)) or 'none'}" for name, title in named.items()]
+    return unknown + [f"{title}: {', '.join(_texts(result, name)) or 'none'}" for name, title in named.items()]
 
 
 def _texts(result: xr.Dataset, name: str) -> list[str]:

@@ -188,6 +188,11 @@ class PeriodMap:
         """Continue from another state, at the same time or another one, s, with no memory of earlier steps."""
         self._integrator.restart(np.array(x), np.zeros((0, 4)), time)
 
+    @property
+    def state_snapshot(self) -> tuple[Array, ...]:
+        """The arrays that later periods depend on; no copies, they may be filled."""
+        return self._integrator.state_snapshot
+
     def advance(self, end: float) -> str:
         """Advance to a time, s, and fill the derivatives; return in words what failed, or nothing."""
         return self.failure(advance_period(self.address, end))
