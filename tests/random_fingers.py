@@ -231,6 +231,7 @@ def passive_tendon(rng: np.random.Generator, table: Table) -> bool:
     table["finger"]["tendons"]["passive"] = {"kind": "passive", "crossings": crossings, "curvature_offset": 0.5}
     table["finger"]["passive_tendon"] = {"stiffness": decades(rng, 1e3, 5e4), "mass": decades(rng, 1e-5, 1e-3)}
     table["finger"]["passive_tendon"]["hysteresis"] = float(rng.uniform(0.0, 0.3) * (rng.random() < 0.5))
+    table["finger"]["passive_tendon"]["slack"] = float(rng.uniform(-5e-4, 5e-4) * (rng.random() < 0.5))
     return True
 
 

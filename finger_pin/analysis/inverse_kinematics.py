@@ -77,9 +77,9 @@ def inverse_kinematics(
 ) -> TipPosture:
     """Return the posture, within the joints' ranges, whose fingertip is nearest to a point.
 
-    Joints that passive tendons drive follow the others as (4) has it, H_c theta = 0 in their rows: tendons that carry
-    nothing. Couplings and loops of a tree are kept to. Of several postures that reach the point it is one near the
-    wanted posture.
+    Joints that passive tendons drive both ways follow the others as (4) has it, H_c theta = -l_0 in their rows: tendons
+    that carry nothing. Couplings and loops of a tree are kept to. Of several postures that reach the point it is one
+    near the wanted posture.
 
     Args:
         finger: One finger.
@@ -95,13 +95,13 @@ def inverse_kinematics(
     # What is moved along paths stays.
     low = np.where(finger.led_joints, preferred - _PATH_MARGIN, low)
     high = np.where(finger.led_joints, preferred + _PATH_MARGIN, high)
-    coupling = PassiveCoupling.inextensible(finger.routing)
+    coupling = PassiveCoupling.inextensible(finger.routing, finger.tendons.slack)
     free = coupling.free
     followers, free_matrix = list(coupling.followers), coupling.matrix[:, free]
     body, constraints = finger.rigid_body, _constraints(finger)
 
     def residuals(angles: Array) -> Array:
-        theta = free_matrix @ angles
+        theta = free_matrix @ angles + coupling.offset
         # A driven joint has a range as well: what is beyond it counts as if the tip were as far away, m/rad.
         beyond = np.maximum(0.0, low - theta)[followers] + np.maximum(0.0, theta - high)[followers]
         misfit = _CONSTRAINT_WEIGHT * constraints(theta)[0]
@@ -109,7 +109,7 @@ def inverse_kinematics(
         return np.concatenate([body.tip_position(theta) - target, beyond, misfit, distance])
 
     def slopes(angles: Array) -> Array:
-        theta = free_matrix @ angles
+        theta = free_matrix @ angles + coupling.offset
         side = (theta > high).astype(float) - (theta < low)
         misfit = _CONSTRAINT_WEIGHT * constraints(theta)[1] @ free_matrix
         beyond = (side[:, None] * free_matrix)[followers]
@@ -126,9 +126,9 @@ def inverse_kinematics(
         best = scipy.optimize.least_squares(
             residuals, inside, slopes, (low[free], high[free]), xtol=1e-15, ftol=1e-15, gtol=1e-15
         )
-        solutions.append((float(best.cost), free_matrix @ best.x))
+        solutions.append((float(best.cost), free_matrix @ best.x + coupling.offset))
         tip_reached = np.linalg.norm(residuals(best.x)[: 3 + len(followers)]) < 0.01 * _REACHED_DISTANCE
-        if tip_reached and np.linalg.norm(constraints(free_matrix @ best.x)[0]) < 0.01 * _REACHED_DISTANCE:
+        if tip_reached and np.linalg.norm(constraints(solutions[-1][1])[0]) < 0.01 * _REACHED_DISTANCE:
             break
     theta = _project_onto_couplings(min(solutions, key=lambda solution: solution[0])[1], constraints, low, high)
     tip_position = np.asarray(body.tip_position(theta))

@@ -57,7 +57,7 @@ def self_locking_map(
 ) -> SelfLockingMap:
     """Return the critical coefficient over the ranges of two joints, all joints moving in their worst directions.
 
-    Joints that passive tendons drive follow the others as inextensible tendons demand, (4).
+    Joints that passive tendons drive both ways follow the others as inextensible tendons demand, (4).
 
     Args:
         finger: A finger with force closure.
@@ -70,7 +70,7 @@ def self_locking_map(
     one_finger(finger.description)
     refuse_without_tendons(finger.description)
     routing, limiter = finger.routing, finger.stroke_limiter
-    coupling = PassiveCoupling.inextensible(routing)
+    coupling = PassiveCoupling.inextensible(routing, finger.tendons.slack)
     free = [routing.joints[index] for index in coupling.free]
     map_joints = tuple(free[-2:]) if joints is None else tuple(joints)
     if len(map_joints) not in (1, 2) or len(set(map_joints)) < len(map_joints):
@@ -86,7 +86,7 @@ def self_locking_map(
     shape = (samples,) * len(axes)
     postures = np.tile(base, (*shape, 1))
     postures[..., columns] = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    flat = (postures @ coupling.matrix.T).reshape(-1, len(base))
+    flat = (postures @ coupling.matrix.T + coupling.offset).reshape(-1, len(base))
     tip = np.array([finger.rigid_body.tip_position(theta) for theta in flat])
     coefficient, tension = _worst_directions(finger, flat, expand(minimum_tension, len(routing.tendons)))
     return SelfLockingMap(

@@ -26,7 +26,8 @@ def self_locking(
 ) -> None:
     """Report the joint friction at which a finger locks, draw its map, and show runs on both sides of it.
 
-    Of a finger that springs return it reports the tensions between which the cord holds it, and whether it comes back.
+    Of a finger that springs or bands return it reports the tensions between which the cord holds it, and whether it
+    comes back.
     """
     shows_progress(quiet=False)
     import numpy as np
@@ -38,8 +39,8 @@ def self_locking(
 
     loaded = fp.load_scenario(scenario)
     finger = loaded.finger
-    has_springs = finger.hand is None and any(joint.spring for joint in finger.joints.values())
-    if has_springs and not fp.Finger(finger).routing.force_closure().holds:
+    returns = finger.passive_names or any(joint.spring for joint in finger.joints.values())
+    if returns and finger.hand is None and not fp.Finger(finger).routing.force_closure().holds:
         if unused := [name for name, value in (("--output", output), ("--format", format)) if value is not None]:
             raise invalid(unused[0], "has no effect: of a finger that springs return nothing is drawn")
         print_text(summarize_return(fp.analysis.spring_return(finger)))

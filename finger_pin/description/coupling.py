@@ -7,9 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger_pin.description.caching import memoised
+from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.routing import Routing
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
+
+_NO_SLACK = np.zeros(1)
+
+
+def slack_lengths(finger: FingerDescription) -> Array:
+    """Return l_0, how much longer passive tendons are, relaxed, than their way at theta = 0, shape (p,), m."""
+    numbers = finger.numbers["passive_tendon"]
+    return numbers["slack"] - numbers["pretension"] / numbers["stiffness"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,25 +39,32 @@ class PassiveCoupling:
     followers: tuple[int, ...]
 
     @classmethod
-    @memoised(
-        lambda _, routing, tension, stiffness, needed=True: (routing, tension.tobytes(), stiffness.tobytes(), needed)
-    )
+    @memoised(lambda _, routing, *numbers, **flags: (routing, *(each.tobytes() for each in numbers), *flags.items()))
     def from_routing(
-        cls, routing: Routing, tension: Array, stiffness: Array, *, needed: bool = True
+        cls,
+        routing: Routing,
+        tension: Array,
+        stiffness: Array,
+        slack: Array = _NO_SLACK,
+        *,
+        needed: bool = True,
+        bands: bool = True,
     ) -> PassiveCoupling:
-        """Solve H_c theta^d = -f^d / K_t for the follower joints.
+        """Solve H_c theta^d = -l_0 - f^d / K_t for the follower joints.
 
         Args:
             routing: The routing.
             tension: f_5^d, shape (p,), N.
             stiffness: K_t, shape (p,), N/m.
+            slack: l_0, shape (p,), m, as `slack_lengths` returns it.
             needed: Whether to refuse tendons that determine a joint twice, rather than let no joint follow.
+            bands: Whether the last joint of a tendon that pulls all of its joints one way follows, too.
         """
         size = len(routing.joints)
         rows, followers = [], []
         for index, row in enumerate(routing.coupling[routing.actuated :]):
             crossed = np.flatnonzero(row)
-            if len(crossed) > 1:
+            if len(crossed) > 1 and (bands or row.min() < 0.0 < row.max()):
                 rows.append(index)
                 followers.append(int(crossed[-1]))
         matrix, offset = np.eye(size), np.zeros(size)
@@ -63,13 +79,16 @@ class PassiveCoupling:
             raise InputError("finger.tendons", f"the passive tendons {names} determine the same joint twice")
         matrix[followers] = 0.0
         matrix[followers] = -np.linalg.solve(driven, coupling @ matrix)
-        offset[followers] = -np.linalg.solve(driven, (tension / stiffness)[rows])
+        offset[followers] = -np.linalg.solve(driven, (slack + tension / stiffness)[rows])
         return cls(matrix, offset, tuple(followers))
 
     @classmethod
-    def inextensible(cls, routing: Routing) -> PassiveCoupling:
-        """Return the coupling by tendons that do not stretch and carry nothing, H_c theta = 0 in their rows: (4)."""
-        return cls.from_routing(routing, np.zeros(routing.passive), np.ones(routing.passive))
+    def inextensible(cls, routing: Routing, slack: Array = _NO_SLACK) -> PassiveCoupling:
+        """Return the coupling by tendons that do not stretch and carry nothing, H_c theta = -l_0 in their rows: (4).
+
+        Tendons that pull all of their joints one way are bands, which stretch.
+        """
+        return cls.from_routing(routing, np.zeros(routing.passive), np.ones(routing.passive), slack, bands=False)
 
     @property
     def free(self) -> list[int]:

@@ -192,10 +192,7 @@ class Tendon(Description):
     crossings: dict[Name, Crossing] = Field({}, description="By joint, in order along the tendon.")
     along: Name | None = Field(None, description="In place of crossings: the tendon of the tree whose path it takes.")
     maximum_tension: Annotated[float, real(0.0, _MOST_TENSION, above=True)] | None = quantity(
-        None,
-        unit="N",
-        source="design",
-        doc="The most that its ideal source or winch pulls with; without end if left out.",
+        None, unit="N", source="design", doc="The most that its ideal source or winch pulls with; no end if left out."
     )
     winch: Winch | None = Field(None, description="An ideal winch, which `controller.tendon_winding` turns.")
     mass_after: int | None = Field(
@@ -244,6 +241,18 @@ class PassiveTendon(Description):
     hysteresis: Annotated[Numbers, reals(0.0, 0.9)] = quantity(
         0.0, unit="1", source="the paper has none", doc="h, part of its tension that a half holds against its stretch."
     )
+    pretension: Annotated[Numbers, reals(0.0, _MOST_TENSION)] = quantity(
+        0.0, unit="N", source="design", doc="T_0, tension with all joints at zero, in place of slack = -T_0 / K_t."
+    )
+    slack: Annotated[Numbers, reals(-1.0, 1.0, hint=MILLIMETRES)] = quantity(
+        0.0, unit="m", source="design", doc="l_0, its relaxed length beyond its way with all joints at zero."
+    )
+
+    @model_validator(mode="after")
+    def _slack_once(self) -> Self:
+        if self.pretension != 0.0 and self.slack != 0.0:
+            raise problem("pretension", "has no place beside slack", self.pretension)
+        return self
 
 
 class StrokeLimiterSettings(Description):

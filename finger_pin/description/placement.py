@@ -144,9 +144,10 @@ def scaled(finger: _Finger, scale: float) -> _Finger:
     tables: Any = finger
     tree, joints = tables.tree, {name: _scaled(joint, scale) for name, joint in tables.joints.items()}
     tendons = {name: _scaled(tendon, scale) for name, tendon in tables.tendons.items()}
-    friction = _scaled(tables.joint_friction, scale)
+    friction, passive = _scaled(tables.joint_friction, scale), tables.passive_tendon
+    passive = passive.updated(slack=_resized(passive.slack, scale, 1))
     if not tree.bodies:
-        return finger.updated(joints=joints, tendons=tendons, joint_friction=friction)
+        return finger.updated(joints=joints, tendons=tendons, joint_friction=friction, passive_tendon=passive)
     for name in (slides := [name for name, joint in tree.joints.items() if joint.kind == "slide"]):
         spring = joints[name].spring
         joints[name] = joints[name].updated(
@@ -158,7 +159,8 @@ def scaled(finger: _Finger, scale: float) -> _Finger:
         lengths = {key: np.where(is_slide, 1.0, scale) * numbers[key] for key in ("coulomb", "stiction")}
         friction = friction.updated(**{key: tuple(each.tolist()) for key, each in lengths.items()})
     tree = _scaled_tree(tree, scale)
-    return finger.updated(joints=joints, tendons=tendons, joint_friction=friction, tree=tree)
+    grown = {"joint_friction": friction, "passive_tendon": passive}
+    return finger.updated(joints=joints, tendons=tendons, tree=tree, **grown)
 
 
 @memoised(lambda name, placed, gravity: (name, placed, gravity))

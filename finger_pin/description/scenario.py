@@ -12,7 +12,7 @@ from pydantic_core import PydanticCustomError
 from finger_pin.description.caching import memoised
 from finger_pin.description.commands import BY_NAME, BY_SOURCE
 from finger_pin.description.controller import ControllerSettings, check_controller
-from finger_pin.description.coupling import PassiveCoupling
+from finger_pin.description.coupling import PassiveCoupling, slack_lengths
 from finger_pin.description.effects import CLOSED_LOOP, OF_SCENARIO, idle, shown
 from finger_pin.description.finger_description import FingerDescription, HandSettings
 from finger_pin.description.objects import EnvironmentSettings, Object
@@ -292,8 +292,8 @@ class Scenario(Description):
         ]
         # In open loop nothing follows a reference.
         needed = self.controller.kind != "tensions"
-        stiffness = expand(self.finger.passive_tendon.stiffness, len(self.finger.passive_names))
-        return PassiveCoupling.from_routing(routing, np.concatenate(wishes), stiffness, needed=needed)
+        numbers = self.finger.numbers["passive_tendon"]["stiffness"], slack_lengths(self.finger)
+        return PassiveCoupling.from_routing(routing, np.concatenate(wishes), *numbers, needed=needed)
 
     def sample_times(self) -> Array:
         """Return the times of the saved signals, s: multiples of the sampling period, and the end."""

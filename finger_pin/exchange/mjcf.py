@@ -178,16 +178,16 @@ def _add_tendons(root: ET.Element, tendons: Tendons, massless: bool) -> None:
         _add_tendon(table, name, routing.joints, routing.coupling[index], damping=tendons.viscous[index])
         ET.SubElement(actuators, "motor", {"name": name, "tendon": name, **limits})
     for index, name in enumerate(routing.passive_names):
-        stiffness = tendons.half_stiffness[index]
+        stiffness, slack = tendons.half_stiffness[index], tendons.slack[index]
         if massless:
             coupling = -routing.coupling[routing.actuated + index]
-            _add_tendon(table, name, routing.joints, coupling, stiffness=0.5 * stiffness)
+            _add_tendon(table, name, routing.joints, coupling, stiffness=0.5 * stiffness, slack=slack)
             continue
         coordinates = (*routing.joints, f"{name}_mass")
         proximal = np.append(-routing.proximal_coupling[index], -1.0)
         distal = np.append(-routing.distal_coupling[index], 1.0)
-        _add_tendon(table, f"{name}_proximal", coordinates, proximal, stiffness=stiffness)
-        _add_tendon(table, f"{name}_distal", coordinates, distal, stiffness=stiffness)
+        _add_tendon(table, f"{name}_proximal", coordinates, proximal, stiffness=stiffness, slack=0.5 * slack)
+        _add_tendon(table, f"{name}_distal", coordinates, distal, stiffness=stiffness, slack=0.5 * slack)
 
 
 def _add_tendon(
@@ -197,11 +197,12 @@ def _add_tendon(
     coupling: Array,
     damping: float = 0.0,
     stiffness: float = 0.0,
+    slack: float = 0.0,
 ) -> None:
-    """Add a tendon; one with stiffness pulls at positive lengths and is slack at negative ones."""
+    """Add a tendon; one with stiffness pulls at lengths above its slack."""
     attributes = {"damping": _numbers(damping)} if stiffness == 0.0 else {"stiffness": _numbers(stiffness)}
     if stiffness != 0.0:
-        attributes["springlength"] = _numbers(-_NO_LOWER_END, 0)
+        attributes["springlength"] = _numbers(-_NO_LOWER_END, slack)
     tendon = ET.SubElement(table, "fixed", {"name": name, **attributes})
     for coordinate, factor in zip(coordinates, coupling, strict=True):
         if factor != 0.0:

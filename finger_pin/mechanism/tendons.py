@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from finger_pin.description.caching import cached_property
 from finger_pin.description.cords import Cord
+from finger_pin.description.coupling import slack_lengths
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.friction import bristles
 from finger_pin.description.routing import Routing
@@ -104,6 +105,11 @@ class Tendons:
         return self.description.numbers["passive_tendon"]["hysteresis"]
 
     @property
+    def slack(self) -> Array:
+        """Length of the passive tendons, relaxed, beyond their way at theta = 0, shape (p,), m."""
+        return slack_lengths(self.description)
+
+    @property
     def mass(self) -> Array:
         """m_5 of the passive tendons, shape (p,), kg."""
         return self.description.numbers["passive_tendon"]["mass"]
@@ -155,8 +161,9 @@ class Tendons:
 
     def stretch(self, position: Array, passive_position: Array) -> tuple[Array, Array]:
         """Return the stretch of the proximal and distal halves, shapes (..., p), m; negative when slack."""
-        proximal = -position @ self.routing.proximal_coupling.T - passive_position
-        distal = passive_position - position @ self.routing.distal_coupling.T
+        loose = 0.5 * self.slack
+        proximal = -position @ self.routing.proximal_coupling.T - passive_position - loose
+        distal = passive_position - position @ self.routing.distal_coupling.T - loose
         return proximal, distal
 
     def rest_position(self, position: Array) -> Array:
@@ -213,6 +220,7 @@ class Tendons:
             names=tuple(f"{name}.{half}" for name in routing.passive_names for half in _HALVES),
             parameters=np.repeat(self.half_stiffness, 2)[None],
             arm=arm,
+            offset=np.repeat(0.5 * self.slack, 2),
             stored=Energy("passive_tendon", "passive tendons"),
         )
         shares = np.repeat(self.hysteresis, 2)

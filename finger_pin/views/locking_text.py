@@ -58,7 +58,7 @@ def summarize_locking(scenario: Scenario, locking_map: SelfLockingMap) -> str:
 
 
 def summarize_return(spring_return: SpringReturn) -> str:
-    """Return in plain text whether springs bring a finger back, and the tensions between which the cord holds it."""
+    """Return in plain text whether a finger comes back, and the tensions between which the cord holds it."""
     ends = {"least bent": 0, "most bent": -1}
     rows = [
         (
@@ -81,7 +81,7 @@ def summarize_return(spring_return: SpringReturn) -> str:
         message = f"it does not come back when the cord is let go: {', '.join(stuck_joints)}"
     return "\n".join(
         [
-            f"Springs against {spring_return.cord}, N: the cord moves a joint in from, and lets it back from",
+            f"Springs and bands against {spring_return.cord}, N: the cord moves a joint in from, and lets it back from",
             *table(("joint", "in", "back"), rows),
             "",
             f"  {message}",
@@ -93,8 +93,8 @@ def summarize_return(spring_return: SpringReturn) -> str:
 
 def _return_sentence(margin: float) -> str:
     if np.isinf(margin):
-        return "nothing resists the springs once the cord is slack"
-    return f"the springs are {margin:.3g} times what resists them once the cord is slack"
+        return "nothing resists the return once the cord is slack"
+    return f"springs, bands and weight are {margin:.3g} times what resists them once the cord is slack"
 
 
 def _closest_posture(margin: SelfLockingMargin) -> str:

@@ -83,10 +83,11 @@ def test_a_joint_whose_friction_grows_with_the_cord_locks_at_its_radius():
     assert np.isinf(found.winding_in).all() and found.ratio == 0.0 and found.returns
 
 
-@pytest.mark.parametrize(("finger", "says"), [("ub_stand_in", "must all be actuated"), ("planar", "must be one of")])
-def test_a_joint_that_no_spring_returns_is_named(finger, says):
-    with pytest.raises(fp.InputError, match=says):
-        fp.analysis.spring_return(finger)
+def test_a_cord_among_several_and_a_passive_tendon_that_couples_joints_are_named():
+    with pytest.raises(fp.InputError, match="must be one of"):
+        fp.analysis.spring_return("planar")
+    with pytest.raises(fp.InputError, match=r"tendons\..*: must pull all of its joints back, against T1"):
+        fp.analysis.spring_return("ub_stand_in", "T1")
 
 
 def test_a_joint_without_a_spring_and_a_wrong_cord_are_named():

@@ -28,6 +28,7 @@ TWO_PASSIVE = {
     },
     "finger.passive_tendon.mass": [1e-5, 3e-4],
     "finger.passive_tendon.stiffness": [5e4, 2e4],
+    "finger.passive_tendon.slack": [1e-3, -5e-4],
     "finger.tendon_friction.viscous": [1.0, 0.5, 0.25, 2.0, 0.7, 0.1],
     "finger.joint_friction.viscous": [1e-3, 2e-3, 0.0, 5e-4],
     "finger.gravity": [3.0, -4.0, 5.0],

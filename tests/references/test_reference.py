@@ -105,6 +105,9 @@ def test_a_tendon_over_three_joints_drives_the_last_one(network):
     assert coupling.followers == (2,)
     a, b, c = sinusoids(coupling, 3).at(1.3).position
     assert c == pytest.approx((3e-3 * a + 2e-3 * b - 2.0 / 1e4) / 4e-3, rel=1e-12)
+    loose = PassiveCoupling.from_routing(routing, np.array([2.0]), np.array([1e4]), np.array([1e-3]))
+    a, b, c = sinusoids(loose, 3).at(1.3).position
+    assert c == pytest.approx((3e-3 * a + 2e-3 * b - 2.0 / 1e4 - 1e-3) / 4e-3, rel=1e-12)
 
 
 def test_a_spring_to_the_base_and_no_passive_tendon_leave_every_joint_its_own_reference(network):
