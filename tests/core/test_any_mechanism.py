@@ -175,7 +175,7 @@ def jacobian(mechanism, x, command, force, step=5e-4):
     near = (x + step * OFFSETS[:, None, None] * np.eye(len(x))).reshape(-1, len(x))
     rates = mechanism.evaluate(near, command, force).rate.reshape(len(OFFSETS), len(x), len(x))
     rough, found = (np.tensordot(weights, rates, axes=1).T / step for weights in (ROUGH, WEIGHTS))
-    return found if np.abs(rough - found).max() < 1e-6 * np.abs(found).max() else None
+    return found if np.abs(rough - found).max() < 1e-7 * np.abs(found).max() else None
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from finger_pin.core.addresses.law_code import ROW
+from finger_pin.core.evaluation.dynamics import contact_states
 from finger_pin.core.jit import Indices, Matrix, Vector, njit_always_inline, njit_inline
 from finger_pin.core.tables.buffers import Work
 from finger_pin.core.tables.mechanism_parameters import Parameters
@@ -111,13 +112,26 @@ def set_culled(structure: Structure, k: int, value: int, culled: Indices) -> Non
 
 @njit_inline
 def list_active_pairs(structure: Structure, pieces: PathWork) -> None:
-    """List the active contact pairs."""
-    count = 0
+    """List the active contact pairs, and where numbers of the state may be other than zero."""
+    live, first, count, parts = pieces.live, 2 * structure.prescribed.size, 0, 0
+    live[0, 0], live[0, 1] = 0, first
     for e in range(structure.contact_rows // structure.contact_arms):
         if pieces.culled[structure.paths.row[e]] == 0:
             pieces.active_pairs[count] = e
             count += 1
+            begin = first + structure.paths.row[e] // structure.contact_arms * (structure.contact_arms - 1)
+            if live[parts, 1] != begin:
+                parts += 1
+                live[parts, 0] = begin
+            live[parts, 1] = begin + structure.contact_arms - 1
     pieces.active_pair_count[0] = count
+    # Those of all other rows come after.
+    begin = first + contact_states(structure)
+    if live[parts, 1] != begin:
+        parts += 1
+        live[parts, 0] = begin
+    live[parts, 1] = first + structure.state_row.size
+    pieces.live_count[0] = parts + 1
 
 
 @njit_always_inline

@@ -122,17 +122,19 @@ def switch_left_branches(structure: Structure, rows: Matrix, kinks: Vector) -> N
 @njit_inline
 def branch_error(integration: Integration, model: Model, time: float, h: float) -> float:
     """Return the error of rows frozen on a branch already left, in tolerances."""
-    structure, rows, kinks, size = model.structure, model.work.rows, integration.kinks, integration.x.size
-    r = integration.r
+    structure, rows, kinks = model.structure, model.work.rows, integration.kinks
+    r, live = integration.r, integration.live
     call_at(model.evaluate, integration.model, time)
     switch_left_branches(structure, rows, kinks)
-    for c in range(size):
-        r[c] = model.rate[c]
+    for part in range(integration.live_count[0]):
+        for c in range(live[part, 0], live[part, 1]):
+            r[c] = model.rate[c]
     call_at(model.evaluate, integration.model, time)
     switch_left_branches(structure, rows, kinks)
-    for c in range(size):
-        r[c] = h * (model.rate[c] - r[c])
-    return step_error(integration.x, model.state, r, integration.rtol, integration.atol)
+    for part in range(integration.live_count[0]):
+        for c in range(live[part, 0], live[part, 1]):
+            r[c] = h * (model.rate[c] - r[c])
+    return step_error(integration, model.state, r)
 
 
 @njit_always_inline
@@ -200,7 +202,7 @@ def locate_event(
             cost = branch_error(integration, model, time + at * h, at * h)
             if cost <= 1.0:
                 copy(end, state)
-                cut_to_share(x, state, integration.dense, at)
+                cut_to_share(integration, state, at)
                 return at, share, cost, count
             behind = min(behind, _TARGET_BRANCH_ERROR * (1.0 - share) * at / cost)
         else:

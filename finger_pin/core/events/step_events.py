@@ -44,7 +44,7 @@ def cut_step(address: int, h: float) -> int:
     """Cut a step that an `Integration` at an address has tried; fill its interpolant and the shares taken and next."""
     integration = unpack(address, INTEGRATION)
     model, memory = unpack(integration.model, MODEL), integration.memory
-    interpolant(integration.tableau, integration.k, integration.dense)
+    interpolant(integration)
     taken_share, retry_share, share = _accepted_shares(integration, model, h, int(memory.outcome[0]))
     if retry_share == 1.0:
         before = _part_before_reversal(integration, model, taken_share * h)
@@ -86,6 +86,8 @@ def cull_contacts(address: int, _time: float) -> int:
         forget_culled(structure, paths, first, model.rate)
         for j in range(integration.k.shape[0]):
             forget_culled(structure, paths, first, integration.k[j])
+        for j in range(integration.dense.shape[0]):
+            forget_culled(structure, paths, first, integration.dense[j])
     return 1
 
 
@@ -134,7 +136,7 @@ def _part_before_reversal(integration: Integration, model: Model, h: float) -> f
     """End a step a little behind the first reversal of sliding; return the share that is taken, 1 without one."""
     memory, part = integration.memory, before_reversal(integration, model, h)
     if part < 1.0:
-        cut_to_share(integration.x, model.state, integration.dense, part)
+        cut_to_share(integration, model.state, part)
         if model.structure.contact_rows:
             # Gaps are looked for from those at its end.
             memory.evaluations[0] += 1

@@ -55,7 +55,7 @@ class Record:
     def from_sizes(cls, count: int, size: int, free: int, rows: int, kinks: int) -> Record:
         """Return an empty record of `count` steps."""
         shapes = (), (size,), (free, 4), (rows, size), (), (kinks,)
-        return cls(*(np.empty((count, *shape)) for shape in shapes))
+        return cls(*(np.zeros((count, *shape)) for shape in shapes))
 
     def first(self, count: int) -> Record:
         """Return the first steps; no copy."""
@@ -132,6 +132,8 @@ class IslandIntegrator:
             start=np.zeros(len(x)),
             r=np.zeros(len(x) + 1),
             end=np.zeros(len(x)),
+            live=self.work.paths.live,
+            live_count=self.work.paths.live_count,
             dense=np.zeros((len(tableau.dense), len(x))),
             kinks=np.zeros(len(structure.state)),
             reevaluate=bool(parameters.has_tip_force or structure.contact_rows),

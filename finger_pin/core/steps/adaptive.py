@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from finger_pin.core.evaluation.attitude_charts import rechart
-from finger_pin.core.jit import CompiledFunction, call_at, copy, copy_matrix, njit_always_inline, njit_inline, unpack
+from finger_pin.core.jit import CompiledFunction, call_at, copy, njit_always_inline, njit_inline, unpack
 from finger_pin.core.steps import integration as at
 from finger_pin.core.steps.error_norm import largest_error_state, step_error
 from finger_pin.core.steps.integration import AdvanceArgs, Integration
@@ -125,14 +125,19 @@ def _pace(integration: Integration, h: float, error: float, final: bool, clipped
 @njit_always_inline
 def accept_step(args: AdvanceArgs, integration: Integration, model: Model, time: float) -> None:
     """Move to the end of an accepted step, and store the step if there is a record."""
-    x, attitude, row = integration.x, integration.attitude, args.record_range[0]
+    x, attitude, row, live = integration.x, integration.attitude, args.record_range[0], integration.live
+    if row < args.times.size:
+        # What is settled may be zero from here on.
+        for part in range(integration.live_count[0]):
+            for j in range(integration.dense.shape[0]):
+                for c in range(live[part, 0], live[part, 1]):
+                    args.dense[row, j, c] = integration.dense[j, c]
     if integration.events.settle:
         call_at(integration.events.settle, args.integration, 0.0)
     copy(model.state, x)
     integration.memory.time[0] = time
     if row < args.times.size:
         args.times[row] = time
-        copy_matrix(integration.dense, args.dense[row])
         copy(x, args.states[row])
         copy(integration.kinks, args.branches[row])
         args.shares[row] = integration.memory.taken_share[0]
@@ -168,7 +173,7 @@ def advance(address: int, end: float) -> int:
             return at.NOT_FINITE
         error = np.inf
         if outcome != at.SINGULAR:
-            error = step_error(integration.x, model.state, integration.k[-1], integration.rtol, integration.atol)
+            error = step_error(integration, model.state, integration.k[-1])
         if not error <= 1.0:
             _shorten(integration, h * min(_fitting(integration, error), 0.9), 0.0)
             if memory.step_size[0] < 1e-14 * max(1.0, abs(time)):

@@ -5,20 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 from finger_pin.core.jit import Vector, njit_always_inline, njit_inline
+from finger_pin.core.steps.integration import Integration
 
 
 @njit_inline
-def step_error(x: Vector, end: Vector, difference: Vector, rtol: float, atol: Vector) -> float:
+def step_error(integration: Integration, end: Vector, difference: Vector) -> float:
     """Return the error of a step as a multiple of the tolerance, root mean square over the state.
 
     It is infinite where the end is not finite: an infinite scale would make any error small.
     """
-    total = 0.0
-    for c in range(x.size):
-        if not np.isfinite(end[c]):
-            return np.inf
-        scale = atol[c] + rtol * max(abs(x[c]), abs(end[c]))
-        total += (difference[c] / scale) ** 2
+    x, rtol, atol, live, total = integration.x, integration.rtol, integration.atol, integration.live, 0.0
+    for part in range(integration.live_count[0]):
+        for c in range(live[part, 0], live[part, 1]):
+            if not np.isfinite(end[c]):
+                return np.inf
+            scale = atol[c] + rtol * max(abs(x[c]), abs(end[c]))
+            total += (difference[c] / scale) ** 2
     return np.sqrt(total / x.size)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from finger_pin.core.jit import Indices, Layers, Matrix, StructType, Vector
+from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, StructType, Vector
 from finger_pin.core.steps.tableaus import Tableau
 from finger_pin.typing import Array
 
@@ -120,6 +120,9 @@ class Integration(NamedTuple):
         start: Scratch, f(t, x) at the start of a step, shape (size,).
         r: Scratch, shape (size + 1,).
         end: Scratch, shape (size,).
+        live: From where to where numbers of the state may be other than zero, shape (parts, 2); all else is zero in
+            states, rates, stages and interpolants.
+        live_count: How many of these parts there are, shape (1,).
         dense: Coefficients of a step's interpolant, shape (rows of the tableau's dense, size).
         kinks: Where each row was between the sides of its kink when the step began, or a sign, shape (K,).
         reevaluate: Whether a second try evaluates its start again, for what is read from the memory of that.
@@ -137,6 +140,8 @@ class Integration(NamedTuple):
     start: Vector
     r: Vector
     end: Vector
+    live: IndexTable
+    live_count: Indices
     dense: Matrix
     kinks: Vector
     reevaluate: bool

@@ -17,7 +17,7 @@ from finger_pin.core.jit import (
     njit_inline,
     unpack,
 )
-from finger_pin.core.steps.tableaus import Tableau
+from finger_pin.core.steps.integration import Integration
 
 
 class Interpolation(NamedTuple):
@@ -122,31 +122,36 @@ def interpolate_share(before: Vector, after: Vector, dense: Matrix, share: float
 
 
 @njit_always_inline
-def interpolant(tableau: Tableau, k: Matrix, dense: Matrix) -> None:
-    """Fill the coefficients of a step's interpolant from its stages k, shape (s, size)."""
-    for row in range(dense.shape[0]):
-        bend = dense[row]
-        for c in range(bend.size):
-            bend[c] = 0.0
-        for j in range(tableau.nodes.size):
-            weight = tableau.dense[row, j]
-            for c in range(bend.size):
-                bend[c] += weight * k[j, c]
+def interpolant(integration: Integration) -> None:
+    """Fill the coefficients of a step's interpolant from its stages."""
+    tableau, k, live = integration.tableau, integration.k, integration.live
+    for row in range(integration.dense.shape[0]):
+        bend = integration.dense[row]
+        for part in range(integration.live_count[0]):
+            begin, end = live[part, 0], live[part, 1]
+            for c in range(begin, end):
+                bend[c] = 0.0
+            for j in range(tableau.nodes.size):
+                weight = tableau.dense[row, j]
+                for c in range(begin, end):
+                    bend[c] += weight * k[j, c]
 
 
 @njit_inline
-def cut_to_share(before: Vector, after: Vector, dense: Matrix, share: float) -> None:
-    """Cut a step to a share: replace the state at its end and its row of ``dense`` by those of that part."""
+def cut_to_share(integration: Integration, after: Vector, share: float) -> None:
+    """Cut a step to a share: replace the state at its end and the interpolant by those of that part."""
+    before, dense, live = integration.x, integration.dense, integration.live
     highest, inverse = share ** (dense.shape[0] + 1), 1.0 / share
-    for c in range(before.size):
-        bend, last, new, power = 0.0, 0.0, 0.0, highest
-        for row in range(dense.shape[0] - 1, -1, -1):
-            old = dense[row, c]
-            bend = old + share * bend
-            new += power * (old - last)
-            power *= inverse
-            dense[row, c], last = new, old
-        after[c] = (1.0 - share) * before[c] + share * (after[c] + (1.0 - share) * bend)
+    for part in range(integration.live_count[0]):
+        for c in range(live[part, 0], live[part, 1]):
+            bend, last, new, power = 0.0, 0.0, 0.0, highest
+            for row in range(dense.shape[0] - 1, -1, -1):
+                old = dense[row, c]
+                bend = old + share * bend
+                new += power * (old - last)
+                power *= inverse
+                dense[row, c], last = new, old
+            after[c] = (1.0 - share) * before[c] + share * (after[c] + (1.0 - share) * bend)
 
 
 @njit_always_inline

@@ -78,9 +78,9 @@ def repeat_steps(address: int, end: float) -> int:
             return at.NOT_FINITE
         if outcome == at.SINGULAR:
             return at.UNDERFLOW
-        interpolant(integration.tableau, integration.k, integration.dense)
+        interpolant(integration)
         if share < 1.0:
-            cut_to_share(integration.x, model.state, integration.dense, share)
+            cut_to_share(integration, model.state, share)
         accept_step(args, integration, model, goal)
         memory.accepted_steps[0] += 1
     return at.DONE

@@ -21,38 +21,43 @@ def try_step(address: int, integration: Integration, model: Model, time: float, 
         `NOT_FINITE_AT_START`, if f(t, x) is not finite.
     """
     tableau, x, k, r, start = integration.tableau, integration.x, integration.k, integration.r, integration.start
-    size, state, rate, events = x.size, model.state, model.rate, integration.events
+    size, state, rate, events, live = x.size, model.state, model.rate, integration.events, integration.live
     g = 1.0 / (h * tableau.gamma)
     outcome = TRIED
     for i in range(tableau.nodes.size):
-        for c in range(size):
-            r[c], rate[c], state[c] = 0.0, start[c], x[c]
-        # Whole rows at a time, so that the compiler can use vector instructions.
-        for j in range(i):
-            stage_weight, coupling_weight = tableau.stage[i, j], tableau.coupling[i, j] / h
-            for c in range(size):
-                state[c] += stage_weight * k[j, c]
-                r[c] += coupling_weight * k[j, c]
+        for part in range(integration.live_count[0]):
+            begin, end = live[part, 0], live[part, 1]
+            for c in range(begin, end):
+                r[c], rate[c], state[c] = 0.0, start[c], x[c]
+            # Whole rows at a time, so that the compiler can use vector instructions.
+            for j in range(i):
+                stage_weight, coupling_weight = tableau.stage[i, j], tableau.coupling[i, j] / h
+                for c in range(begin, end):
+                    state[c] += stage_weight * k[j, c]
+                    r[c] += coupling_weight * k[j, c]
         if i == 0 and fresh:
             call_at(events.release, address, 0.0)
         if i > 0 or fresh or integration.reevaluate:
             call_at(model.evaluate, integration.model, time + tableau.nodes[i] * h)
         if i == 0:
             if fresh:
-                for c in range(size):
-                    start[c] = rate[c]
-                    if not np.isfinite(rate[c]):
-                        return NOT_FINITE_AT_START
+                for part in range(integration.live_count[0]):
+                    for c in range(live[part, 0], live[part, 1]):
+                        start[c] = rate[c]
+                        if not np.isfinite(rate[c]):
+                            return NOT_FINITE_AT_START
                 call_at(events.freeze, address, 0.0)
                 call_at(model.linearise, integration.model, time)
             if call_at(model.condense, integration.model, g) == 0:
                 return SINGULAR
         elif i < tableau.nodes.size - 1 and call_at(events.left, address, 0.0):
             outcome = LEFT_BRANCH
-        for c in range(size):
-            r[c] += rate[c]
+        for part in range(integration.live_count[0]):
+            for c in range(live[part, 0], live[part, 1]):
+                r[c] += rate[c]
         r[size] = h * tableau.time[i]
         solve(model.linear, r, k[i])
-    for c in range(size):
-        state[c] += k[tableau.nodes.size - 1, c]
+    for part in range(integration.live_count[0]):
+        for c in range(live[part, 0], live[part, 1]):
+            state[c] += k[tableau.nodes.size - 1, c]
     return outcome

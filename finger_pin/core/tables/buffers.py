@@ -135,5 +135,5 @@ def build_work(structure: Structure, laws: Sequence[Law | ContactLaw], channels:
         command=np.zeros(channels),
         guide=np.zeros(int(structure.prescribed.max(initial=-1)) + 1),
         guide_rate=np.zeros(int(structure.prescribed.max(initial=-1)) + 1),
-        paths=build_path_work(structure.paths, count, width),
+        paths=build_path_work(structure.paths, count, width, 2 * width + len(structure.state_row)),
     )

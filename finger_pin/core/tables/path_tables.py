@@ -119,6 +119,9 @@ class PathWork(NamedTuple):
         active: Zero for gaps that are open, shape (E,).
         active_pairs: Contact pairs that are not culled, in order, shape (E,).
         active_pair_count: Their number, shape (1,).
+        live: From where to where numbers of the state may be other than zero, as states of culled contacts are not,
+            shape (2 + contact pairs, 2); kept from step to step.
+        live_count: Their number, shape (1,).
         closed: Gaps that are not open, in order, shape (E,).
         closed_count: Their number, shape (1,).
         culled: One for the rows of a contact that is at rest and too far away to close, shape (K,); kept from step to
@@ -149,6 +152,8 @@ class PathWork(NamedTuple):
     active: Indices
     active_pairs: Indices
     active_pair_count: Indices
+    live: IndexTable
+    live_count: Indices
     closed: Indices
     closed_count: Indices
     culled: Indices
@@ -240,14 +245,16 @@ def coordinates_of_paths(paths: PathStructure, count: int, width: int) -> NDArra
     return mask
 
 
-def build_path_work(paths: PathStructure, count: int, width: int) -> PathWork:
-    """Allocate the memory for the pieces of K rows."""
+def build_path_work(paths: PathStructure, count: int, width: int, size: int) -> PathWork:
+    """Allocate the memory for the pieces of K rows, with N coordinates and a state of some size."""
     pieces, entries, columns = len(paths.columns), len(paths.at), int(paths.columns.max(initial=1))
     return PathWork(
         out=np.zeros((pieces, GAP_OUT_SIZE)),
         active=np.ones(pieces, dtype=np.int64),
         active_pairs=np.arange(pieces),
         active_pair_count=np.array([np.count_nonzero(paths.columns > 1)]),
+        live=np.array([[0, size], *[[0, 0]] * (1 + np.count_nonzero(paths.columns > 1))]),
+        live_count=np.ones(1, dtype=np.int64),
         closed=np.zeros(pieces, dtype=np.int64),
         closed_count=np.zeros(1, dtype=np.int64),
         culled=np.zeros(count, dtype=np.int64),
