@@ -6,6 +6,7 @@ from scipy.linalg import expm
 from validation.mujoco_motion import EXPRESSIBLE
 
 import finger_pin as fp
+from finger_pin.description.validation import validate
 
 STIFFNESS, DRAG = "finger.joints.drum.spring.stiffness", "finger.tendon_friction.drag"
 
@@ -148,3 +149,32 @@ def test_near_a_reversal_derivatives_are_those_of_the_side_of_the_state_and_it_i
     np.testing.assert_allclose(slope, 5e4 * 0.02 * (1.0 - 0.5 / level * np.sign(speed)), rtol=1e-5)
     assert found.side_by_state.sel(by_state="joint_velocity[drum]") == np.sign(speed)
     assert not found.side_by_state.drop_sel(by_state="joint_velocity[drum]").any()
+
+
+def test_the_map_over_a_stop_with_a_damper_has_what_an_earlier_hit_changes():
+    """A joint at w meets a damper at the edge: w exp(-g (dt - t)) from t on, g = b / J; an earlier start hits later."""
+    damper, edge, speed, dt = 2e-3, 0.5, 2.0, 2e-3
+    table = {
+        "name": "stop",
+        "gravity": [0.0, 0.0, 0.0],
+        "joints": {"hinge": {"range": [-3.0, edge]}},
+        "joint_friction": {"coulomb": 0.0, "stiction": 0.0, "viscous": 0.0},
+        "stroke_limiter": {"stiffness": 1e-9, "damping": 0.0, "viscous": damper},
+        "tendons": {},
+        "tree": {
+            "bodies": {
+                "link": {"mass": 0.02, "centre": [0.03, 0.0, 0.0], "inertia": [1e-6, 2e-6, 2e-6, 0.0, 0.0, 0.0]}
+            },
+            "joints": {"hinge": {"body": "link", "bearing": False}},
+            "actuators": {"push": {"joint": "hinge"}},
+        },
+    }
+    finger = fp.Finger(validate(fp.FingerDescription, table, ()))
+    start, decay = 0.4983, damper / (2e-6 + 0.02 * 0.03**2)
+    hit = (edge - start) / speed
+    left = np.exp(-decay * (dt - hit))
+    found = fp.linearise(finger, finger.rest_state([start], [speed]), [0.0], dt=dt)
+    # theta = edge + w (1 - left) / g; by the start t changes by -1 / w, by the speed by -t / w.
+    by_start, by_speed = [left, -decay * left], [hit * left + (1.0 - left) / decay, left * (1.0 - decay * hit)]
+    np.testing.assert_allclose(found.A.values[:2, :2], np.transpose([by_start, by_speed]), rtol=1e-5, atol=1e-8)
+    np.testing.assert_allclose(found.rate[:2], [edge + speed * (1.0 - left) / decay, speed * left], rtol=1e-6)

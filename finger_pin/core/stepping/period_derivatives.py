@@ -10,22 +10,16 @@ Laguerre polynomials L_k of parameter -1, and the last c makes the sum zero wher
 b are those of the step's start: what they change within the step is the error, of first order in h. Where derivatives
 are to be exact, the first sixth of a step has those of its start, the next two thirds those of its middle, and the last
 those of its end, on the branches of kinks on which it was taken: Simpson's rule for what they change. Steps end where
-the motion passes a kink, across which the rate is continuous, so that when a changed motion passes it does not count.
+the motion passes a kink; `period_kinks` has what derivatives gain there.
 """
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 from finger_pin.core.addresses.law_code import ROW
 from finger_pin.core.evaluation.condensation import solve
 from finger_pin.core.jit import (
     CompiledFunction,
-    IndexTable,
-    Indices,
-    Layers,
     Matrix,
-    StructType,
     Vector,
     call_at,
     copy,
@@ -34,7 +28,8 @@ from finger_pin.core.jit import (
     njit_inline,
     unpack,
 )
-from finger_pin.core.signals.state_batches import exert_alone
+from finger_pin.core.stepping.period_evaluations import PERIOD_ARGS, PeriodArgs, evaluate_changed, evaluate_plain
+from finger_pin.core.stepping.period_kinks import cross_kinks
 from finger_pin.core.steps import integration as core
 from finger_pin.core.steps.interpolation import interpolate_share
 from finger_pin.core.tables.linear_systems import Linear
@@ -46,100 +41,17 @@ from finger_pin.core.tables.model import MODEL, Model
 _LEAST_SHARE, _SHARE = 0.459, 2.5
 
 
-class PeriodArgs(NamedTuple):
-    """Arguments of `advance_period` for n states, u inputs, t tips and p parameters; m = u + 3 t + p.
-
-    Attributes:
-        advance: Address of the function that advances an integration.
-        args: Address of its `AdvanceArgs`, with room for one step.
-        exact: Whether J and b of a step's middle and end act as well.
-        plain: Address of a `Model` of the same inputs and forces, for evaluations alone.
-        varied: Addresses of such models with one parameter changed each, shape (p,).
-        derivatives: Filled: of the state at the end by that at the start and what is held, shape (n, n + m).
-        held: Memory, b, shape (n, m).
-        inverse: Memory, W, shape (n, n).
-        terms: Memory for D_(k-1) and D_k, shape (2 n, n + m).
-        weights: Memory, c_k from c_0 = 1 on, shape (6,).
-        right: Memory, shape (n + 1,).
-        start, state: Memory, the state at a step's start and where derivatives are asked for, shape (n,).
-        steps: By how much each number of the state, and of what is held, is changed for differences, shape (n + m,).
-        weights_of_rows: Weights of forces and inputs of the rows in the signals that are watched, shape (2, K, k).
-        watched: Filled by `fill_watched`: these signals at the state, shape (k,).
-        slopes: Filled by it: their derivatives by the state and what is held, shape (k, n + m).
-        bristles: Places of bristles in the state, their rows, and columns of the rows' levels, shape (b, 3).
-        levels: Filled by `limit_bristles`: their levels, infinite for all other numbers of the state, shape (n,).
-    """
-
-    advance: int
-    args: int
-    exact: bool
-    plain: int
-    varied: Indices
-    derivatives: Matrix
-    held: Matrix
-    inverse: Matrix
-    terms: Matrix
-    weights: Vector
-    right: Vector
-    start: Vector
-    state: Vector
-    steps: Vector
-    weights_of_rows: Layers
-    watched: Vector
-    slopes: Matrix
-    bristles: IndexTable
-    levels: Vector
-
-
-PERIOD_ARGS = StructType(PeriodArgs)
-
-
-@njit_inline
-def _evaluate(address: int, state: Vector, rates: bool) -> None:
-    """Evaluate a model at a state, or its rows alone, which takes less."""
-    model = unpack(address, MODEL)
-    copy(state, model.state)
-    if rates:
-        call_at(model.evaluate, address, 0.0)
-    else:
-        copy(model.control.tension, model.work.command)
-        exert_alone(model, address, 0.0)
-
-
-@njit_inline
-def _evaluate_changed(period: PeriodArgs, state: Vector, column: int, rates: bool) -> int:
-    """Evaluate at a state with what is held changed in one number; return the address of the model that has."""
-    plain = unpack(period.plain, MODEL)
-    inputs, forces, step = plain.control.tension, plain.parameters.tip_force, period.steps[state.size + column]
-    if column < inputs.size:
-        value = inputs[column]
-        inputs[column] = value + step
-        _evaluate(period.plain, state, rates)
-        inputs[column] = value
-        return period.plain
-    column -= inputs.size
-    if column < 3 * forces.shape[0]:
-        value = forces[column // 3, column % 3]
-        forces[column // 3, column % 3] = value + step
-        _evaluate(period.plain, state, rates)
-        forces[column // 3, column % 3] = value
-        return period.plain
-    address = period.varied[column - 3 * forces.shape[0]]
-    _evaluate(address, state, rates)
-    return address
-
-
 @njit_inline
 def _fill_held(period: PeriodArgs, state: Vector) -> None:
     """Fill b at a state: derivatives of the rate by inputs, forces and parameters."""
     held, size = period.held, period.held.shape[0]
     plain = unpack(period.plain, MODEL)
-    _evaluate(period.plain, state, True)
+    evaluate_plain(period.plain, state, True)
     for i in range(size):
         for c in range(held.shape[1]):
             held[i, c] = plain.rate[i]
     for c in range(held.shape[1]):
-        changed = unpack(_evaluate_changed(period, state, c, True), MODEL)
+        changed = unpack(evaluate_changed(period, state, c, True), MODEL)
         for i in range(size):
             held[i, c] = (changed.rate[i] - held[i, c]) / period.steps[size + c]
 
@@ -252,6 +164,8 @@ def advance_period(address: int, end: float) -> int:
             return status
         if not _propagate(period, integration, model, memory.time[0] - start):
             return core.UNDERFLOW
+        if period.exact or memory.taken_share[0] < 1.0:
+            cross_kinks(period, integration, model)
     return core.DONE
 
 
@@ -261,7 +175,7 @@ def limit_bristles(address: int, _time: float) -> int:
     period = unpack(address, PERIOD_ARGS)
     integration = unpack(unpack(period.args, core.ADVANCE_ARGS).integration, core.INTEGRATION)
     rows = unpack(period.plain, MODEL).work.rows
-    _evaluate(period.plain, integration.x, False)
+    evaluate_plain(period.plain, integration.x, False)
     for b in range(period.bristles.shape[0]):
         place, level = period.bristles[b, 0], rows[period.bristles[b, 2], period.bristles[b, 1]]
         integration.x[place], period.levels[place] = min(max(integration.x[place], -level), level), level
@@ -283,18 +197,18 @@ def fill_watched(address: int, _time: float) -> int:
     period = unpack(address, PERIOD_ARGS)
     state = unpack(unpack(period.args, core.ADVANCE_ARGS).integration, core.INTEGRATION).x
     size, signals, source = state.size, period.watched.size, period.plain
-    _evaluate(source, state, False)
+    evaluate_plain(source, state, False)
     for s in range(signals):
         period.watched[s] = _sum_rows(period, source, s)
     for c in range(period.steps.size):
         if c < size:
             value = state[c]
             state[c] = value + period.steps[c]
-            _evaluate(source, state, False)
+            evaluate_plain(source, state, False)
             state[c] = value
             changed = source
         else:
-            changed = _evaluate_changed(period, state, c - size, False)
+            changed = evaluate_changed(period, state, c - size, False)
         for s in range(signals):
             period.slopes[s, c] = (_sum_rows(period, changed, s) - period.watched[s]) / period.steps[c]
     return 1

@@ -12,13 +12,8 @@ from finger_pin.core.jit import copied, pack
 from finger_pin.core.signals.bound_models import BoundModel
 from finger_pin.core.signals.compiled_finger import CompiledMechanism
 from finger_pin.core.stepping.island_stepper import IslandIntegrator, failure
-from finger_pin.core.stepping.period_derivatives import (
-    PERIOD_ARGS,
-    PeriodArgs,
-    advance_period,
-    fill_watched,
-    limit_bristles,
-)
+from finger_pin.core.stepping.period_derivatives import advance_period, fill_watched, limit_bristles
+from finger_pin.core.stepping.period_evaluations import PERIOD_ARGS, PeriodArgs
 from finger_pin.core.stepping.stepper import TABLEAUS
 from finger_pin.core.steps import integration as core
 from finger_pin.core.tables.inputs import held_control
@@ -133,6 +128,7 @@ class PeriodMap:
             right=np.zeros(size + 1),
             start=np.zeros(size),
             state=np.zeros(size),
+            gradient=np.zeros(size + held),
             steps=np.concatenate([_STATE_CHANGE * self.finger.layout.scales(), changes]),
             weights_of_rows=np.zeros((2, len(self._structure.state), 0)),
             watched=np.zeros(0),

@@ -1,0 +1,105 @@
+"""What a map over a period works with, and evaluations with one number changed."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from finger_pin.core.jit import (
+    IndexTable,
+    Indices,
+    Layers,
+    Matrix,
+    StructType,
+    Vector,
+    call_at,
+    copy,
+    njit_inline,
+    unpack,
+)
+from finger_pin.core.signals.state_batches import exert_alone
+from finger_pin.core.tables.model import MODEL
+
+
+class PeriodArgs(NamedTuple):
+    """Arguments of `advance_period` for n states, u inputs, t tips and p parameters; m = u + 3 t + p.
+
+    Attributes:
+        advance: Address of the function that advances an integration.
+        args: Address of its `AdvanceArgs`, with room for one step.
+        exact: Whether J and b of a step's middle and end act as well.
+        plain: Address of a `Model` of the same inputs and forces, for evaluations alone.
+        varied: Addresses of such models with one parameter changed each, shape (p,).
+        derivatives: Filled: of the state at the end by that at the start and what is held, shape (n, n + m).
+        held: Memory, b, shape (n, m).
+        inverse: Memory, W, shape (n, n).
+        terms: Memory for D_(k-1) and D_k, shape (2 n, n + m).
+        weights: Memory, c_k from c_0 = 1 on, shape (6,).
+        right: Memory, shape (n + 1,).
+        start, state: Memory, the state at a step's start and where derivatives are asked for, shape (n,).
+        gradient: Memory, of a kink by the state and what is held, shape (n + m,).
+        steps: By how much each number of the state, and of what is held, is changed for differences, shape (n + m,).
+        weights_of_rows: Weights of forces and inputs of the rows in the signals that are watched, shape (2, K, k).
+        watched: Filled by `fill_watched`: these signals at the state, shape (k,).
+        slopes: Filled by it: their derivatives by the state and what is held, shape (k, n + m).
+        bristles: Places of bristles in the state, their rows, and columns of the rows' levels, shape (b, 3).
+        levels: Filled by `limit_bristles`: their levels, infinite for all other numbers of the state, shape (n,).
+    """
+
+    advance: int
+    args: int
+    exact: bool
+    plain: int
+    varied: Indices
+    derivatives: Matrix
+    held: Matrix
+    inverse: Matrix
+    terms: Matrix
+    weights: Vector
+    right: Vector
+    start: Vector
+    state: Vector
+    gradient: Vector
+    steps: Vector
+    weights_of_rows: Layers
+    watched: Vector
+    slopes: Matrix
+    bristles: IndexTable
+    levels: Vector
+
+
+PERIOD_ARGS = StructType(PeriodArgs)
+
+
+@njit_inline
+def evaluate_plain(address: int, state: Vector, rates: bool) -> None:
+    """Evaluate a model at a state, or its rows alone, which takes less."""
+    model = unpack(address, MODEL)
+    copy(state, model.state)
+    if rates:
+        call_at(model.evaluate, address, 0.0)
+    else:
+        copy(model.control.tension, model.work.command)
+        exert_alone(model, address, 0.0)
+
+
+@njit_inline
+def evaluate_changed(period: PeriodArgs, state: Vector, column: int, rates: bool) -> int:
+    """Evaluate at a state with what is held changed in one number; return the address of the model that has."""
+    plain = unpack(period.plain, MODEL)
+    inputs, forces, step = plain.control.tension, plain.parameters.tip_force, period.steps[state.size + column]
+    if column < inputs.size:
+        value = inputs[column]
+        inputs[column] = value + step
+        evaluate_plain(period.plain, state, rates)
+        inputs[column] = value
+        return period.plain
+    column -= inputs.size
+    if column < 3 * forces.shape[0]:
+        value = forces[column // 3, column % 3]
+        forces[column // 3, column % 3] = value + step
+        evaluate_plain(period.plain, state, rates)
+        forces[column // 3, column % 3] = value
+        return period.plain
+    address = period.varied[column - 3 * forces.shape[0]]
+    evaluate_plain(address, state, rates)
+    return address
