@@ -22,6 +22,8 @@ from finger_pin.typing import Array
 _EQUAL = 0.02
 # Points in the hull by which volumes are compared, directions in which distances are, and faces that boxes lie on.
 _POINTS, _DIRECTIONS, _FACES = 6000, 3000, 12
+# Products of directions and corners at a time.
+_PRODUCTS = 80_000
 # Parts of the way from sizes and centre of equal moments to those of equal extents.
 _MIXES = (0.0, 0.5, 1.0)
 # Least length of a capsule, over its radius: without any it is a ball.
@@ -77,9 +79,12 @@ class Hull(NamedTuple):
         edges = np.diff(tetrahedra, axis=1)
         areas = 0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
         normals = hull.equations[:, :3]
-        directions = np.concatenate([_spread(_DIRECTIONS), normals])
-        # In parts that stay on one thread: several wait for each other where the machine is busy.
-        support = np.concatenate([(part @ corners.T).max(axis=1) for part in np.array_split(directions, 64)])
+        spread = _spread(_DIRECTIONS)
+        directions = np.concatenate([spread, normals])
+        # In parts so small that they stay on one thread: several wait for each other where the machine is busy. Along
+        # its normal a face has its own offset.
+        parts = np.array_split(spread, math.ceil(len(spread) * len(corners) / _PRODUCTS))
+        support = np.concatenate([*((part @ corners.T).max(axis=1) for part in parts), -hull.equations[:, 3]])
         volume, centre = float(volumes.sum()), inside + offset
         return cls(corners, normals, areas, volume, centre, covariance, samples, directions, support)
 

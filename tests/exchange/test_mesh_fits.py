@@ -89,6 +89,14 @@ def test_the_volume_between_a_cube_and_what_lies_in_it_is_what_the_cube_has_more
     assert abs(found - (8.0 - volume)) < 0.025 * 8.0
 
 
+@pytest.mark.parametrize("name", ["cube", "cylinder", "ellipsoid"])
+def test_support_of_a_hull_is_the_largest_coordinate_of_its_corners_along_spread_directions_and_faces(name):
+    corners = Rotation.from_rotvec([0.3, -0.5, 0.8]).apply(SOLIDS[name][2] + [0.02, -0.03, 0.05])
+    hull = Hull.around(corners)
+    assert len(hull.directions) == 3000 + len(hull.normals)
+    np.testing.assert_allclose(hull.support, (hull.directions @ corners.T).max(axis=1), atol=1e-12)
+
+
 def test_the_distance_of_a_ball_from_a_cube_is_that_of_its_corners():
     hull = Hull.around(box(2.0, 2.0, 2.0))
     assert abs(Fit("sphere", (1.0,), np.zeros(3), EVEN).distance(hull) - (np.sqrt(3.0) - 1.0)) < 2e-3
