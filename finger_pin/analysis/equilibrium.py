@@ -186,6 +186,10 @@ class _Statics:
 def _check_can_rest(finger: Finger) -> None:
     """Refuse a hand of several fingers, and a finger whose rest depends on more than its inputs."""
     description, tables = finger.description, finger.mechanism.rows
+    sheathed = [name for name, tendon in description.tendons.items() if tendon.winch and tendon.winch.pieces]
+    if sheathed:
+        allowed = "must be 0 for postures at rest: where a cord rests in its sheath depends on how it came there"
+        raise InputError(f"{description.entry('tendons', sheathed[0])}.winch.pieces", allowed)
     has_drives = any(table.pulls and table.group not in (SOURCES_WITH_END, WINCHES) for table in tables)
     stateful = any(table.states for table in finger.constructor_args.rows)
     free = finger.layout.names_of("object_pose")

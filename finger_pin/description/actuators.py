@@ -228,6 +228,9 @@ class Actuator(Description):
         source="the paper has none",
         doc="h, part of its tension that a tendon holds against its stretch.",
     )
+    tendon_pieces: Annotated[Numbers, reals(0.0, 64.0, whole=True)] = quantity(
+        0.0, unit="1", source="chosen", doc="Pieces of a tendon that stretch in its sheath; 0 for none."
+    )
     pretension: Annotated[Numbers, reals(0.0, 1e5)] = quantity(
         0.0, unit="N", source="design", doc="K e0, with the spool and all joints at zero; of several all there is."
     )
@@ -245,10 +248,14 @@ class Actuator(Description):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         by_tendon = ("spool_radius", "tendon_rigidity", "tendon_length", "tendon_damping", "tendon_hysteresis")
-        for name in (*by_tendon, "pretension"):
+        for name in (*by_tendon, "tendon_pieces", "pretension"):
             value = getattr(self, name)
             if isinstance(value, tuple) and len(value) != len(self.tendons):
                 raise problem(name, f"must be one number or one per tendon: {', '.join(self.tendons)}", list(value))
+        count = len(self.tendons)
+        if np.any((expand(self.tendon_pieces, count) > 0.0) & (expand(self.tendon_hysteresis, count) > 0.0)):
+            allowed = "must be 0 of a tendon with tendon_pieces, which loses by rubbing in its sheath"
+            raise problem("tendon_hysteresis", allowed, self.tendon_hysteresis)
         if len(set(self.tendons)) != len(self.tendons):
             raise problem("tendons", "must be different tendons", list(self.tendons))
         together = f"winds = {json.dumps(['in'] * len(self.tendons))} winds all in together"

@@ -29,8 +29,7 @@ from finger_pin.description.validation import (
 )
 from finger_pin.typing import Array
 
-# Osmium, kg/m3 (CRC Handbook of Chemistry and Physics), and the least mass, kg, that is asked about: in grams a link
-# has one or more.
+# Osmium, kg/m3 (CRC Handbook of Chemistry and Physics); least mass, kg, that is asked about: in grams links have more.
 _LARGEST_DENSITY, _LEAST_DENSITY = 22590.0, 1.0
 _MOST_TENSION = 1e6
 
@@ -178,6 +177,7 @@ class Winch(Description):
     damping: Annotated[float, real(0.0, 1e6)] = quantity(
         10.0, unit="N s/m", source="estimate: that of elastic tendons", doc="D, on the speed of the cord in its canal."
     )
+    pieces: int = Field(0, ge=0, le=64, strict=True, description="Pieces of it that stretch in its sheath; 0 for none.")
 
 
 class Tendon(Description):

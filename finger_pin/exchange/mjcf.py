@@ -61,7 +61,8 @@ _SOFT_STOPS = "what stops take of an impact by its depth (Hunt-Crossley); they a
 _HYSTERESIS_LEFT_OUT = """
   - what springs of joints and passive tendons hold against their motion (hysteresis);"""
 _SERVOS_LEFT_OUT = """
-  - servos, their spools and what stretches on the way: controls pull at the entrance of the canals."""
+  - servos, winches, their spools and what stretches on the way or in a sheath: controls pull at the entrance of the
+    canals."""
 _WITH_MASS = """
   A passive tendon is a slide joint, its lumped mass, between two springs that only pull."""
 _WITHOUT_MASS = """
@@ -140,7 +141,8 @@ def _header(description: FingerDescription, tendons: Tendons, massless: bool, fr
     notes["held"] = _HYSTERESIS_LEFT_OUT if any(springs) or tendons.hysteresis.any() else ""
     notes["stops"] = _SOFT_STOPS if limits else _NO_STOPS
     notes["contacts"] = ";\n  - ".join(CONTACTS_LEFT_OUT)
-    notes["servos"] = _SERVOS_LEFT_OUT if description.actuators else ""
+    wound = bool(description.actuators) or any(tendon.winch for tendon in description.tendons.values())
+    notes["servos"] = _SERVOS_LEFT_OUT if wound else ""
     if tendons.routing.passive:
         notes["passive"] = _WITHOUT_MASS if massless else _WITH_MASS
     return _HEADER.format(**notes).replace("--", "- -")

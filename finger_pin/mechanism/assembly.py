@@ -21,6 +21,7 @@ from finger_pin.mechanism.object_scene import Scene
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows, state_scales
 from finger_pin.mechanism.servos import Actuators
+from finger_pin.mechanism.sheaths import in_sheaths
 from finger_pin.mechanism.state import BLOCKS, Layout
 from finger_pin.mechanism.tendon_paths import TendonPaths
 from finger_pin.mechanism.tendons import Tendons
@@ -106,12 +107,14 @@ def assemble(
     of_tree = {table.group: table for table in tree_rows(description, paths, width)}
     dry_friction = [of_tree.pop(group) for group in ("tendon_dry_friction",) if group in of_tree]
     custom_drives = [table for table in args.rows if table.pulls]
-    drives = (*actuators.tendon_rows(width), *tendons.sources(width), *custom_drives)
+    pulling = [*actuators.tendon_rows(width), *tendons.sources(width)]
+    pulling, sheaths = in_sheaths(description, tendons.friction, pulling)
+    drives = (*pulling, *sheaths[:2], *custom_drives)
     matrices = tendons.drive_matrices(drives)
     tendon_rows = [along_paths(description, paths, table) for table in tendons.rows(drives, len(actuators.inertias))]
     canals = Canals(description, paths, tendons, [*of_tree.values(), *tendon_rows], matrices, width)
     spring_table, *spring_hysteresis = springs.rows(width)
-    further = [*spring_hysteresis, *dry_friction, *args.rows]
+    further = [*spring_hysteresis, *dry_friction, *sheaths, *args.rows]
     tables = [
         *of_tree.values(),
         *tendon_rows,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from operator import attrgetter, methodcaller
 from typing import Any
 
@@ -12,28 +13,43 @@ from finger_pin.laws.capstan import capstan_coefficient
 from finger_pin.mechanism.contact_signals import CONTACT_SECTIONS
 from finger_pin.mechanism.groups import CANALS
 from finger_pin.mechanism.rows import Rows, weighted_sum
+from finger_pin.mechanism.sheaths import SHEATHS
 from finger_pin.mechanism.signals import FingerSignals, Quantity, Section
 from finger_pin.mechanism.state import BLOCKS
 from finger_pin.typing import Array
 
 
+def _sheaths(signals: FingerSignals) -> Array:
+    """Return the weights of places in sheaths in sums over tendons, shape (t, k); k = 0 without any."""
+    tendons = len(signals.finger.routing.tendons)
+    return signals.finger.drive_matrices.get(SHEATHS, np.zeros((tendons, 0)))[:tendons]
+
+
+def _everywhere(signals: FingerSignals, field: str) -> Array:
+    """Return the sum of a field over all places where each tendon rubs, those in sheaths as well."""
+    weights, total = _sheaths(signals), signals.at_all_places(field)
+    return total + weighted_sum(signals.rows[SHEATHS].field(field), weights.T) if weights.size else total
+
+
 def _coefficient(signals: FingerSignals) -> Array:
     """Return mu^d, (16), of all curvature together."""
     whole = signals.at_first_place("coefficient")
-    if not signals.finger.wraps:
+    sheathed = np.any(_sheaths(signals), axis=1)
+    if not signals.finger.wraps and not sheathed.any():
         return whole
     surface = np.concatenate([signals.rows[name].rows.parameters[0] for name in ("driven_tendons", "passive_tendons")])
-    curvature = signals.at_all_places("curvature")
-    return np.where(signals.has_several_places, capstan_coefficient(surface, curvature), whole)
+    curvature = _everywhere(signals, "curvature")
+    return np.where(signals.has_several_places | sheathed, capstan_coefficient(surface, curvature), whole)
 
 
 def _normal_force(signals: FingerSignals) -> Array:
     """Return F^n = |f| + |f^a|, (14), with f before micro-damping."""
     of_first, actuated = signals.at_first_place("normal_force"), signals.finger.routing.actuated
-    if not signals.finger.wraps:
+    several = signals.has_several_places | np.any(_sheaths(signals), axis=1)
+    if not several.any():
         return of_first
-    ends = np.abs(signals.strands[..., :actuated]) + np.abs(signals.rows["driven_tendons"].row.command)
-    return np.where(signals.has_several_places, np.concatenate([ends, of_first[..., actuated:]], axis=-1), of_first)
+    ends = np.abs(signals.strands[..., :actuated]) + np.abs(_entering(signals)[..., :actuated])
+    return np.where(several, np.concatenate([ends, of_first[..., actuated:]], axis=-1), of_first)
 
 
 def _wrap_tension(signals: FingerSignals) -> Array:
@@ -47,7 +63,11 @@ def _wrap_tension(signals: FingerSignals) -> Array:
 def _entering(signals: FingerSignals) -> Array:
     """Return f^a, what pulls at the canal's entrance; of a passive tendon its proximal half."""
     proximal = signals.strands[..., signals.finger.routing.actuated :: 2]
-    return np.concatenate([signals.rows["driven_tendons"].row.command, proximal], axis=-1)
+    pulling, weights = signals.rows["driven_tendons"].row.command, _sheaths(signals)
+    if weights.size:
+        # What pulls there is what sheaths have left.
+        pulling = pulling + weighted_sum(signals.rows[SHEATHS].field("friction"), weights[: pulling.shape[-1]].T)
+    return np.concatenate([pulling, proximal], axis=-1)
 
 
 def _spring_torque(signals: FingerSignals) -> Array:
@@ -88,13 +108,13 @@ SECTIONS = (
                 _TENDON, "m/s", "sliding velocity", methodcaller("at_first_place", "speed"), "3"
             ),
             "tendon_friction": Quantity(
-                _TENDON, "N", "tendon friction force", methodcaller("at_all_places", "friction"), "9c"
+                _TENDON, "N", "tendon friction force", partial(_everywhere, field="friction"), "9c"
             ),
             **_states("tendon_stiction"),
             "tendon_normal_force": Quantity(_TENDON, "N", "sum of the tensions at both ends", _normal_force, "14"),
             "tendon_friction_coefficient": Quantity(_TENDON, "1", "Coulomb coefficient", _coefficient, "16"),
             "tendon_curvature": Quantity(
-                _TENDON, "rad", "total curvature of the path", methodcaller("at_all_places", "curvature"), "15"
+                _TENDON, "rad", "total curvature of the path", partial(_everywhere, field="curvature"), "15"
             ),
             "joint_torque": Quantity(
                 _JOINT, "N m", "torque of the tendons", methodcaller("at_joints", "tendon_torque"), "11"

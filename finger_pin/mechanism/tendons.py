@@ -20,12 +20,12 @@ from finger_pin.laws.spring import TENDON_HALF
 from finger_pin.mechanism.groups import SOURCES, SOURCES_WITH_END, TENDON_LOSSES, WINCHES
 from finger_pin.mechanism.joints import OF_TENDONS, hysteresis_rows
 from finger_pin.mechanism.rows import Energy, Rows
+from finger_pin.mechanism.sheaths import WINCH_ENERGY, piece_numbers
 from finger_pin.mechanism.wiring import drive_matrices
 from finger_pin.typing import Array, Number
 
 SLACK = Energy("slack", "tensions cut at zero")
 BRISTLES = Energy("tendon_bristles", "tendon bristles")
-_WINCH_ENERGY = Energy("winches", "winches, through their cords")
 _HALVES = ("proximal", "distal")
 _HYSTERESIS_ENERGY = Energy("passive_hysteresis", "passive tendons stretching")
 
@@ -49,9 +49,15 @@ class Tendons:
 
     @cached_property
     def wraps(self) -> tuple[tuple[Cord, ...], ...]:
-        """The places where each of its tendons, and of those of its tree, rubs."""
-        cords = (*self.routing.cords.values(), *map(self.description.cord, self.description.canals))
-        return tuple(cord.wraps for cord in cords)
+        """The places where each of its tendons, and of those of its tree, rubs, behind sheaths with pieces."""
+        cords, places = {**self.routing.cords}, list[tuple[Cord, ...]]()
+        for name in piece_numbers(self.description):
+            cords[name] = cords[name]._replace(curvature_offset=0.0)
+        for cord, whole in zip(cords.values(), self.routing.cords.values(), strict=True):
+            # The sheath is one more of them.
+            count = len(cord.wraps) + (cord is not whole)
+            places.append(tuple(wrap._replace(share=1.0 / count) for wrap in cord.wraps))
+        return (*places, *(self.description.cord(name).wraps for name in self.description.canals))
 
     @cached_property
     def several(self) -> dict[int, list[tuple[Array, float, NDArray[np.bool_]]]]:
@@ -59,12 +65,14 @@ class Tendons:
 
         Turns have shape (n,), offsets are in rad; only tendons on joints are there, none along paths through space.
         """
-        joints, through_space = self.routing.joints, self.routing.through_space
-        return {
-            k: [(wrap.turns(joints), wrap.offset, np.isin(joints, [*wrap.crossed])) for wrap in self.wraps[k]]
-            for k in range(len(through_space))
-            if len(self.wraps[k]) > 1 and not through_space[k]
-        }
+        joints, through_space, found = self.routing.joints, self.routing.through_space, {}
+        for k, (cord, places) in enumerate(zip(self.routing.cords.values(), self.wraps, strict=False)):
+            if len(places) > 1 and not through_space[k]:
+                found[k] = [(place.turns(joints), place.offset, np.isin(joints, [*place.crossed])) for place in places]
+                if cord.wraps[0].share != places[0].share:
+                    sheath = np.zeros(len(joints)), cord.curvature_offset, np.isin(joints, [*cord.crossed])
+                    found[k].insert(0, sheath)
+        return found
 
     def _number(self, entry: str) -> Array:
         return self.description.numbers["tendon_friction"][entry][: len(self.routing.tendons)]
@@ -189,7 +197,7 @@ class Tendons:
             elif most is not None:
                 plain[k] = [1.0, 0.0, 0.0, 0.0, 0.0, most, 0.0, most]
         tables = []
-        for group, numbers, supplied in ((SOURCES_WITH_END, plain, SOURCES), (WINCHES, winches, _WINCH_ENERGY)):
+        for group, numbers, supplied in ((SOURCES_WITH_END, plain, SOURCES), (WINCHES, winches, WINCH_ENERGY)):
             if not numbers:
                 continue
             places, arm = np.array(list(numbers), dtype=np.int64), np.zeros((len(numbers), width))

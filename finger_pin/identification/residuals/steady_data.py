@@ -229,6 +229,7 @@ class SteadyReadings(RecordingModel):
             "several cords": len(actuator.tendons) > 1,
             "motor.friction.backlash": actuator.motor.friction.backlash > 0.0,
             "motor.cogging": actuator.motor.cogging is not None,
+            "tendon_pieces": bool(np.any(actuator.tendon_pieces)),
             "position_loop.torque_off": actuator.position_loop.torque_off is not None,
         }
         unsupported = " and ".join(what for what, there in reasons.items() if there)

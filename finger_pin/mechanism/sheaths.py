@@ -1,0 +1,205 @@
+"""Cords that stretch within their sheaths, as pieces in series that rub between them; `laws.sheath` has their laws.
+
+A winch or a spool pulls its tendon with the tension at the sheath's entrance, and every place where the cord rubs takes
+its part of that, along the cord behind the sheath. Its own speed there follows from the tensions before and behind it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from finger_pin.description.finger_description import FingerDescription
+from finger_pin.description.validation import expand
+from finger_pin.exceptions import InputError
+from finger_pin.laws.capstan import PASSIVE_FRICTION
+from finger_pin.laws.sheath import SHEATH_PIECE, SHEATH_PLACE, SHEATH_SLIP, SPOOL_ENTRANCE, WOUND_ENTRANCE
+from finger_pin.mechanism.groups import TENDON_LOSSES, WINCHES
+from finger_pin.mechanism.rows import Energy, Rows
+from finger_pin.typing import Array
+
+#: The table of the places where sheathed cords rub.
+SHEATHS = "tendon_sheaths"
+#: What winches supply.
+WINCH_ENERGY = Energy("winches", "winches, through their cords")
+_ELASTIC_TENDONS, _PIECES, _SLIPS = "elastic_tendons", "sheath_pieces", "sheath_slips"
+# Least viscous coefficient over the cord's stiffness, s: waves of sliding settle within a few times this.
+_RELAXATION = 1e-4
+
+
+def piece_numbers(description: FingerDescription) -> dict[str, int]:
+    """Return the numbers of pieces of the cords that stretch within their sheaths, by tendon."""
+    numbers = {name: each.winch.pieces for name, each in description.tendons.items() if each.winch}
+    for each in description.actuators.values():
+        numbers |= dict(zip(each.tendons, map(int, expand(each.tendon_pieces, len(each.tendons))), strict=True))
+    return {name: number for name, number in numbers.items() if number}
+
+
+def rubbing_shares(number: int) -> Array:
+    """Return the parts of a sheath that rub at its places, shape (n,): short at its ends, where waves start."""
+    uniform = np.linspace(0.0, 1.0, number + 1)
+    return np.diff(0.2 * uniform + 0.4 * (1.0 - np.cos(np.pi * uniform)))
+
+
+class _Cord(NamedTuple):
+    """A sheathed cord.
+
+    Attributes:
+        table: The table that pulls it.
+        row: Its row there.
+        name: Of the tendon.
+        shares: Parts of the sheath that rub at its places, shape (n,).
+        stiffness: K, N/m.
+        damping: D, N s/m.
+        first: Index of its first place among those of all cords.
+    """
+
+    table: Rows
+    row: int
+    name: str
+    shares: Array
+    stiffness: float
+    damping: float
+    first: int
+
+    @property
+    def compliances(self) -> Array:
+        """Parts of the cord's compliance before, between and behind its places, shape (n + 1,)."""
+        parts: Array = 0.5 * (np.append(self.shares, 0.0) + np.append(0.0, self.shares))
+        return parts
+
+
+def in_sheaths(
+    description: FingerDescription, friction: Array, drives: Sequence[Rows]
+) -> tuple[list[Rows], list[Rows]]:
+    """Return drives with the entrances of sheathed cords in place of whole cords, then places and pieces, if any.
+
+    Args:
+        description: The finger.
+        friction: Parameters of `PASSIVE_FRICTION` of its tendons, shape (f, t or more).
+        drives: Tables of winches and of tendons on spools among them.
+
+    Raises:
+        InputError: If a sheathed cord has a stiction ratio above 1: where it slips there would be no one speed.
+    """
+    numbers, cords, first = piece_numbers(description), list[_Cord](), 0
+    for table in drives:
+        winch = table.group == WINCHES
+        for row, name in enumerate(table.pulls if winch or table.group == _ELASTIC_TENDONS else ()):
+            if number := numbers.get(name, 0):
+                keys = ("gain", "by_speed") if winch else ("stiffness", "damping")
+                stiffness, damping = (abs(float(table[key][row])) for key in keys)
+                cords.append(_Cord(table, row, name, rubbing_shares(number), stiffness, damping, first))
+                first += number
+    if not cords:
+        return [*drives], []
+    columns = [[*description.tendons].index(cord.name) for cord in cords]
+    rubbing = dict(zip(PASSIVE_FRICTION.parameters, friction[:, columns], strict=True))
+    for cord, ratio in zip(cords, rubbing["ratio"].tolist(), strict=True):
+        if ratio != 1.0:
+            allowed = f"must be 1 where a cord stretches within its sheath, as {cord.name} does by its pieces"
+            raise InputError("finger.tendon_friction.stiction_ratio", allowed, ratio)
+    entered = [_entrances(table, [cord for cord in cords if cord.table is table], first) for table in drives]
+    places = _places(description, entered, cords, rubbing)
+    return entered, [places, _slips(places, cords), _pieces(places, cords)]
+
+
+def _entrances(table: Rows, cords: Sequence[_Cord], places: int) -> Rows:
+    """Return a table of drives in which some cords end at their first places."""
+    if not cords:
+        return table
+    winch, reading = table.group == WINCHES, np.zeros((table.count, places))
+    stiffness, damping = (table["gain"], -table["by_speed"]) if winch else (table["stiffness"], table["damping"])
+    most, offset = table["most"] if winch else np.full(table.count, np.inf), table.offset.copy()
+    stiffness, damping = stiffness.copy(), damping.copy()
+    for cord in cords:
+        part = cord.compliances[0]
+        # What pretension stretches is shared by all pieces; places have the damping.
+        stiffness[cord.row], offset[cord.row], damping[cord.row] = cord.stiffness / part, part * offset[cord.row], 0.0
+        reading[cord.row, cord.first] = -1.0 / part
+    law, parameters = WOUND_ENTRANCE if winch else SPOOL_ENTRANCE, np.array([stiffness, damping, most])
+    return replace(table, law=law, parameters=parameters, offset=offset, readings={_SLIPS: reading})
+
+
+def _places(
+    description: FingerDescription, drives: Sequence[Rows], cords: Sequence[_Cord], rubbing: Mapping[str, Array]
+) -> Rows:
+    """Return the table of places where cords rub, along their tendons."""
+    count = sum(len(cord.shares) for cord in cords)
+    before = {_PIECES: np.zeros((count, count))} | {each.group: np.zeros((count, each.count)) for each in drives}
+    arm, turns, parameters = np.zeros((count, drives[0].arm.shape[1])), np.zeros(count), list[Array]()
+    for k, cord in enumerate(cords):
+        whole = description.cord(cord.name)
+        own = np.arange(cord.first, cord.first + len(cord.shares))
+        before[cord.table.group][own[0], cord.row] = before[_PIECES][own[1:], own[:-1]] = 1.0
+        arm[own, : len(description.joints)] = whole.arms(list(description.joints))
+        turns[own] = cord.shares * whole.curvature_offset
+        # The sheath is one of the places that share what has no load.
+        viscous, drag = (rubbing[key][k] / (1 + len(whole.wraps)) for key in ("viscous", "drag"))
+        viscous = max(cord.damping + viscous, _RELAXATION * cord.stiffness)
+        beside = cord.stiffness * (1.0 / cord.compliances[:-1] + 1.0 / cord.compliances[1:])
+        # Places move as fast as they can without ringing.
+        mass, wound = 0.25 * (viscous * cord.shares) ** 2 / beside, float(cord.table.group == WINCHES)
+        values = rubbing["surface"][k], mass, viscous * cord.shares, drag * cord.shares, wound
+        parameters.append(np.array(np.broadcast_arrays(*values)))
+    names = [(cord.name, f"{cord.name}.{number}") for cord in cords for number in range(1, 1 + len(cord.shares))]
+    return Rows(
+        SHEATHS,
+        SHEATH_PLACE,
+        tuple(name for _, name in names),
+        np.hstack(parameters),
+        arm,
+        inputs={_PIECES: np.eye(count)},
+        loads={group: weights for group, weights in before.items() if np.any(weights)},
+        curvature_offset=turns,
+        stored=_stored(cords),
+        powers=(WINCH_ENERGY, *TENDON_LOSSES[:2]),
+        pulls=tuple(tendon for tendon, _ in names),
+    )
+
+
+def _slips(places: Rows, cords: Sequence[_Cord]) -> Rows:
+    """Return the table of how far places are drawn in."""
+    stiffness = np.concatenate([np.full(len(cord.shares), cord.stiffness) for cord in cords])
+    reading = {SHEATHS: np.eye(places.count)}
+    return replace(
+        places,
+        group=_SLIPS,
+        law=SHEATH_SLIP,
+        parameters=stiffness[None],
+        inputs={},
+        loads={},
+        readings=reading,
+        curvature_offset=np.zeros(places.count),
+        powers=(),
+    )
+
+
+def _pieces(places: Rows, cords: Sequence[_Cord]) -> Rows:
+    """Return the table of the pieces behind places."""
+    reading, compliance = np.zeros((places.count, places.count)), np.zeros(places.count)
+    pretension = np.zeros(places.count)
+    for cord in cords:
+        own, parts = np.arange(cord.first, cord.first + len(cord.shares)), cord.compliances[1:]
+        reading[own, own], reading[own[:-1], own[1:]] = 1.0 / parts, -1.0 / parts[:-1]
+        if cord.table.group != WINCHES:
+            compliance[own] = parts / cord.stiffness
+            pretension[own] = -cord.stiffness * cord.table.offset[cord.row]
+    return Rows(
+        _PIECES,
+        SHEATH_PIECE,
+        places.names,
+        np.array([compliance, pretension]),
+        np.zeros_like(places.arm),
+        readings={_SLIPS: reading},
+        stored=_stored(cords),
+        powers=(WINCH_ENERGY,),
+    )
+
+
+def _stored(cords: Sequence[_Cord]) -> Energy:
+    """Return the energy of cords on spools, which their tables share; of winches none is stored."""
+    return next((each.table.stored for each in cords if each.table.group != WINCHES), cords[0].table.stored)
