@@ -10,7 +10,7 @@ import scipy.optimize
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.description.validation import finite_vector, suggestion
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.coerce import FingerLike, as_finger
 from finger_pin.typing import Array
 
 # By how much motors may miss their angles, rad, where springs store a joule less; and by how little, in the root of a
@@ -19,7 +19,7 @@ _MISFIT, _NEAR = 1e-4, 1e-3
 
 
 def taut_posture(
-    finger: Finger, motor_position: Mapping[str, float], near: Array, coupling: PassiveCoupling
+    finger: FingerLike, motor_position: Mapping[str, float], near: Array, coupling: PassiveCoupling
 ) -> tuple[Array, Array]:
     """Return the posture in which taut cords turn motors to angles, shape (n,), and how joints may turn then, (n, n).
 
@@ -27,7 +27,7 @@ def taut_posture(
     second array times changes of angles, to first order.
 
     Args:
-        finger: The finger.
+        finger: The finger or its description.
         motor_position: By motor theta_m, rad; others follow.
         near: A posture, shape (n,), rad, for joints that neither motors nor springs tell of.
         coupling: The joints that passive tendons drive.
@@ -35,6 +35,7 @@ def taut_posture(
     Raises:
         InputError: Naming a motor that is none, or an angle that is not finite.
     """
+    finger = as_finger(finger)
     names, limiter = finger.actuators.names, finger.stroke_limiter
     for name in motor_position:
         if name not in names:
