@@ -24,6 +24,8 @@ from finger_pin.mechanism.gaps.signed_distance import GAP_OUT
 GAP_ACCURACY = 1e-9
 # Steps as far as the last one that a culled pair stays open for, 1: the next one may be longer.
 _STEPS_AHEAD = 3.0
+# Culled pairs, beside as many as are active, from which on loops leave theirs out, 1: parts cost more than numbers.
+_FEWEST_CULLED = 300
 # Greatest deflection of bristles that count as straight, m: a ten thousandth of the diameter of an atom.
 _STRAIGHT_DEFLECTION = 1e-14
 
@@ -132,6 +134,9 @@ def list_active_pairs(structure: Structure, pieces: PathWork) -> None:
         live[parts, 0] = begin
     live[parts, 1] = first + structure.state_row.size
     pieces.live_count[0] = parts + 1
+    if 2 * count > structure.contact_rows // structure.contact_arms - _FEWEST_CULLED:
+        # Loops over all, from zero on, are the faster.
+        live[0, 1], pieces.live_count[0] = first + structure.state_row.size, 1
 
 
 @njit_always_inline

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from finger_pin.core.evaluation.attitude_charts import rechart
-from finger_pin.core.jit import CompiledFunction, call_at, copy, njit_always_inline, njit_inline, unpack
+from finger_pin.core.jit import CompiledFunction, call_at, copy, copy_matrix, njit_always_inline, njit_inline, unpack
 from finger_pin.core.steps import integration as at
 from finger_pin.core.steps.error_norm import largest_error_state, step_error
 from finger_pin.core.steps.integration import AdvanceArgs, Integration
@@ -128,10 +128,13 @@ def accept_step(args: AdvanceArgs, integration: Integration, model: Model, time:
     x, attitude, row, live = integration.x, integration.attitude, args.record_range[0], integration.live
     if row < args.times.size:
         # What is settled may be zero from here on.
-        for part in range(integration.live_count[0]):
-            for j in range(integration.dense.shape[0]):
-                for c in range(live[part, 0], live[part, 1]):
-                    args.dense[row, j, c] = integration.dense[j, c]
+        if integration.live_count[0] == 1:
+            copy_matrix(integration.dense, args.dense[row])
+        else:
+            for part in range(integration.live_count[0]):
+                for j in range(integration.dense.shape[0]):
+                    for c in range(live[part, 0], live[part, 1]):
+                        args.dense[row, j, c] = integration.dense[j, c]
     if integration.events.settle:
         call_at(integration.events.settle, args.integration, 0.0)
     copy(model.state, x)

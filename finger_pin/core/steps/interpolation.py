@@ -122,19 +122,28 @@ def interpolate_share(before: Vector, after: Vector, dense: Matrix, share: float
 
 
 @njit_always_inline
-def interpolant(integration: Integration) -> None:
-    """Fill the coefficients of a step's interpolant from its stages."""
-    tableau, k, live = integration.tableau, integration.k, integration.live
+def _interpolant(integration: Integration, begin: int, end: int) -> None:
+    """Fill coefficients in a part of the state."""
+    tableau, k = integration.tableau, integration.k
     for row in range(integration.dense.shape[0]):
         bend = integration.dense[row]
-        for part in range(integration.live_count[0]):
-            begin, end = live[part, 0], live[part, 1]
+        for c in range(begin, end):
+            bend[c] = 0.0
+        for j in range(tableau.nodes.size):
+            weight = tableau.dense[row, j]
             for c in range(begin, end):
-                bend[c] = 0.0
-            for j in range(tableau.nodes.size):
-                weight = tableau.dense[row, j]
-                for c in range(begin, end):
-                    bend[c] += weight * k[j, c]
+                bend[c] += weight * k[j, c]
+
+
+@njit_always_inline
+def interpolant(integration: Integration) -> None:
+    """Fill the coefficients of a step's interpolant from its stages."""
+    live, parts = integration.live, integration.live_count[0]
+    if parts == 1:
+        _interpolant(integration, 0, integration.x.size)
+    else:
+        for part in range(parts):
+            _interpolant(integration, live[part, 0], live[part, 1])
 
 
 @njit_inline
