@@ -45,10 +45,8 @@ class FreeBodies:
         self.converted = [i for i in joints if trees[i] & joined or self._has_several_geoms(trees[i])]
         for i in self.converted:
             condition = "its middle hinge of three must not come to a right angle"
-            name, dofs = (
-                self.names.bodies[int(model.jnt_bodyid[i])],
-                slice(*(int(model.jnt_dofadr[i]) + np.array([0, 6]))),
-            )
+            name, first = self.names.bodies[int(model.jnt_bodyid[i])], int(model.jnt_dofadr[i])
+            dofs = slice(first, first + 6)
             reader.left_out.add(f"free body {name}: {condition}", moves=False)
             if np.any(model.dof_damping[dofs]) or np.any(model.dof_armature[dofs]):
                 reader.left_out.add(f"free body {name}: damping and armature are those of its slides and hinges")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from operator import attrgetter, methodcaller
 from typing import Any
 
@@ -19,33 +18,21 @@ from finger_pin.mechanism.state import BLOCKS
 from finger_pin.typing import Array
 
 
-def _sheaths(signals: FingerSignals) -> Array:
-    """Return the weights of places in sheaths in sums over tendons, shape (t, k); k = 0 without any."""
-    tendons = len(signals.finger.routing.tendons)
-    return signals.finger.drive_matrices.get(SHEATHS, np.zeros((tendons, 0)))[:tendons]
-
-
-def _everywhere(signals: FingerSignals, field: str) -> Array:
-    """Return the sum of a field over all places where each tendon rubs, those in sheaths as well."""
-    weights, total = _sheaths(signals), signals.at_all_places(field)
-    return total + weighted_sum(signals.rows[SHEATHS].field(field), weights.T) if weights.size else total
-
-
 def _coefficient(signals: FingerSignals) -> Array:
     """Return mu^d, (16), of all curvature together."""
     whole = signals.at_first_place("coefficient")
-    sheathed = np.any(_sheaths(signals), axis=1)
+    sheathed = np.any(signals.sheath_weights, axis=1)
     if not signals.finger.wraps and not sheathed.any():
         return whole
     surface = np.concatenate([signals.rows[name].rows.parameters[0] for name in ("driven_tendons", "passive_tendons")])
-    curvature = _everywhere(signals, "curvature")
+    curvature = signals.at_all_places("curvature")
     return np.where(signals.has_several_places | sheathed, capstan_coefficient(surface, curvature), whole)
 
 
 def _normal_force(signals: FingerSignals) -> Array:
     """Return F^n = |f| + |f^a|, (14), with f before micro-damping."""
     of_first, actuated = signals.at_first_place("normal_force"), signals.finger.routing.actuated
-    several = signals.has_several_places | np.any(_sheaths(signals), axis=1)
+    several = signals.has_several_places | np.any(signals.sheath_weights, axis=1)
     if not several.any():
         return of_first
     ends = np.abs(signals.strands[..., :actuated]) + np.abs(_entering(signals)[..., :actuated])
@@ -63,7 +50,7 @@ def _wrap_tension(signals: FingerSignals) -> Array:
 def _entering(signals: FingerSignals) -> Array:
     """Return f^a, what pulls at the canal's entrance; of a passive tendon its proximal half."""
     proximal = signals.strands[..., signals.finger.routing.actuated :: 2]
-    pulling, weights = signals.rows["driven_tendons"].row.command, _sheaths(signals)
+    pulling, weights = signals.rows["driven_tendons"].row.command, signals.sheath_weights
     if weights.size:
         # What pulls there is what sheaths have left.
         pulling = pulling + weighted_sum(signals.rows[SHEATHS].field("friction"), weights[: pulling.shape[-1]].T)
@@ -108,13 +95,13 @@ SECTIONS = (
                 _TENDON, "m/s", "sliding velocity", methodcaller("at_first_place", "speed"), "3"
             ),
             "tendon_friction": Quantity(
-                _TENDON, "N", "tendon friction force", partial(_everywhere, field="friction"), "9c"
+                _TENDON, "N", "tendon friction force", methodcaller("at_all_places", "friction"), "9c"
             ),
             **_states("tendon_stiction"),
             "tendon_normal_force": Quantity(_TENDON, "N", "sum of the tensions at both ends", _normal_force, "14"),
             "tendon_friction_coefficient": Quantity(_TENDON, "1", "Coulomb coefficient", _coefficient, "16"),
             "tendon_curvature": Quantity(
-                _TENDON, "rad", "total curvature of the path", partial(_everywhere, field="curvature"), "15"
+                _TENDON, "rad", "total curvature of the path", methodcaller("at_all_places", "curvature"), "15"
             ),
             "joint_torque": Quantity(
                 _JOINT, "N m", "torque of the tendons", methodcaller("at_joints", "tendon_torque"), "11"

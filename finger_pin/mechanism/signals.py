@@ -16,6 +16,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.evaluation import ContactPoints, Evaluation
 from finger_pin.mechanism.object_scene import Scene
 from finger_pin.mechanism.rows import Energy, RowSignals, weighted_sum
+from finger_pin.mechanism.sheaths import SHEATHS
 from finger_pin.mechanism.state import State
 from finger_pin.typing import Array
 
@@ -170,9 +171,16 @@ class FingerSignals:
         return np.concatenate([self.rows[name].field(field) for name in ("driven_tendons", "passive_tendons")], axis=-1)
 
     def at_all_places(self, field: str) -> Array:
-        """Return the sum of a field over all places where each tendon rubs, shape (..., t)."""
-        further = (weighted_sum(self.rows[name].field(field), at.T) for name, at in self.finger.wraps.items())
+        """Return the sum of a field over all places where each tendon rubs, also in sheaths, shape (..., t)."""
+        places = self.finger.wraps | ({SHEATHS: self.sheath_weights} if self.sheath_weights.size else {})
+        further = (weighted_sum(self.rows[name].field(field), at.T) for name, at in places.items())
         return sum(further, self.at_first_place(field))
+
+    @property
+    def sheath_weights(self) -> Array:
+        """Weights of places in sheaths in sums over tendons, shape (t, k); k = 0 without any."""
+        tendons = len(self.finger.routing.tendons)
+        return self.finger.drive_matrices.get(SHEATHS, np.zeros((tendons, 0)))[:tendons]
 
     def at_places(self, field: str) -> Array:
         """Return a field at every place of the tendons that rub at several, in the order of `Finger.wrap_names`."""

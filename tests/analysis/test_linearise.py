@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from hinged_link import HINGED_INERTIA, hinged_link
 from scipy.linalg import expm
 from validation.mujoco_motion import EXPRESSIBLE
 
 import finger_pin as fp
-from finger_pin.description.validation import validate
 
 STIFFNESS, DRAG = "finger.joints.drum.spring.stiffness", "finger.tendon_friction.drag"
 
@@ -154,23 +154,12 @@ def test_near_a_reversal_derivatives_are_those_of_the_side_of_the_state_and_it_i
 def test_the_map_over_a_stop_with_a_damper_has_what_an_earlier_hit_changes():
     """A joint at w meets a damper at the edge: w exp(-g (dt - t)) from t on, g = b / J; an earlier start hits later."""
     damper, edge, speed, dt = 2e-3, 0.5, 2.0, 2e-3
-    table = {
-        "name": "stop",
-        "gravity": [0.0, 0.0, 0.0],
-        "joints": {"hinge": {"range": [-3.0, edge]}},
-        "joint_friction": {"coulomb": 0.0, "stiction": 0.0, "viscous": 0.0},
-        "stroke_limiter": {"stiffness": 1e-9, "damping": 0.0, "viscous": damper},
-        "tendons": {},
-        "tree": {
-            "bodies": {
-                "link": {"mass": 0.02, "centre": [0.03, 0.0, 0.0], "inertia": [1e-6, 2e-6, 2e-6, 0.0, 0.0, 0.0]}
-            },
-            "joints": {"hinge": {"body": "link", "bearing": False}},
-            "actuators": {"push": {"joint": "hinge"}},
-        },
-    }
-    finger = fp.Finger(validate(fp.FingerDescription, table, ()))
-    start, decay = 0.4983, damper / (2e-6 + 0.02 * 0.03**2)
+    finger = hinged_link(
+        joints={"hinge": {"range": [-3.0, edge]}},
+        joint_friction={"coulomb": 0.0, "stiction": 0.0, "viscous": 0.0},
+        stroke_limiter={"stiffness": 1e-9, "damping": 0.0, "viscous": damper},
+    )
+    start, decay = 0.4983, damper / HINGED_INERTIA
     hit = (edge - start) / speed
     left = np.exp(-decay * (dt - hit))
     found = fp.linearise(finger, finger.rest_state([start], [speed]), [0.0], dt=dt)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 import scipy.linalg
+from hinged_link import HINGED_INERTIA, hinged_link
 
 import finger_pin as fp
 from finger_pin.core.stepping.period_map import PeriodMap
 from finger_pin.description.loading import ParametrisedScenario
-from finger_pin.description.validation import validate
 from finger_pin.exceptions import InputError
 
 PERIOD = 1e-3
@@ -73,24 +73,12 @@ def test_derivatives_by_the_state_are_differences_of_runs(wound):
 
 
 def test_derivatives_of_a_linear_finger_are_its_matrix_exponential():
-    table = {
-        "name": "linear",
-        "gravity": [0.0, 0.0, 0.0],
-        "joints": {"hinge": {"range": [-3.0, 3.0], "limited": False, "spring": {"stiffness": 0.4, "damping": 2e-3}}},
-        "tendons": {},
-        "tree": {
-            "bodies": {
-                "link": {"mass": 0.02, "centre": [0.03, 0.0, 0.0], "inertia": [1e-6, 2e-6, 2e-6, 0.0, 0.0, 0.0]}
-            },
-            "joints": {"hinge": {"body": "link", "bearing": False}},
-            "actuators": {"push": {"joint": "hinge"}},
-        },
-    }
-    finger = fp.Finger(validate(fp.FingerDescription, table, ()))
+    spring = {"stiffness": 0.4, "damping": 2e-3}
+    finger = hinged_link(joints={"hinge": {"range": [-3.0, 3.0], "limited": False, "spring": spring}})
     periods = PeriodMap(finger, finger.rest_state([0.3], [-2.0]), rtol=1e-8, atol_scale=1e-8)
     periods.inputs[:] = 0.05
     assert not periods.advance(0.02)
-    inertia = 2e-6 + 0.02 * 0.03**2
+    inertia = HINGED_INERTIA
     # By the states, and by the torque of the actuator.
     rates = np.array([[0.0, 1.0, 0.0], [-0.4 / inertia, -2e-3 / inertia, 1.0 / inertia], [0.0, 0.0, 0.0]])
     expected = scipy.linalg.expm(0.02 * rates)

@@ -122,18 +122,16 @@ def switch_left_branches(structure: Structure, rows: Matrix, kinks: Vector) -> N
 @njit_inline
 def branch_error(integration: Integration, model: Model, time: float, h: float) -> float:
     """Return the error of rows frozen on a branch already left, in tolerances."""
-    structure, rows, kinks = model.structure, model.work.rows, integration.kinks
-    r, live = integration.r, integration.live
+    structure, rows, kinks, size = model.structure, model.work.rows, integration.kinks, integration.x.size
+    r = integration.r
     call_at(model.evaluate, integration.model, time)
     switch_left_branches(structure, rows, kinks)
-    for part in range(integration.live_count[0]):
-        for c in range(live[part, 0], live[part, 1]):
-            r[c] = model.rate[c]
+    for c in range(size):
+        r[c] = model.rate[c]
     call_at(model.evaluate, integration.model, time)
     switch_left_branches(structure, rows, kinks)
-    for part in range(integration.live_count[0]):
-        for c in range(live[part, 0], live[part, 1]):
-            r[c] = h * (model.rate[c] - r[c])
+    for c in range(size):
+        r[c] = h * (model.rate[c] - r[c])
     return step_error(integration, model.state, r)
 
 

@@ -87,8 +87,6 @@ class _Recorder:
             self.room = self.room.doubled()
         else:
             self._packed.add(self.room)
-            # Of a step only what is live is written.
-            self.room.dense[..., self._packed.stored] = 0.0
             self._used = 0
 
     @property

@@ -55,7 +55,7 @@ class Record:
     def from_sizes(cls, count: int, size: int, free: int, rows: int, kinks: int) -> Record:
         """Return an empty record of `count` steps."""
         shapes = (), (size,), (free, 4), (rows, size), (), (kinks,)
-        return cls(*(np.zeros((count, *shape)) for shape in shapes))
+        return cls(*(np.empty((count, *shape)) for shape in shapes))
 
     def first(self, count: int) -> Record:
         """Return the first steps; no copy."""

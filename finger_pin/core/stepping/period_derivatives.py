@@ -51,7 +51,7 @@ def _fill_held(period: PeriodArgs, state: Vector) -> None:
         for c in range(held.shape[1]):
             held[i, c] = plain.rate[i]
     for c in range(held.shape[1]):
-        changed = unpack(evaluate_changed(period, state, c, True), MODEL)
+        changed = unpack(evaluate_changed(period, state, size + c, True), MODEL)
         for i in range(size):
             held[i, c] = (changed.rate[i] - held[i, c]) / period.steps[size + c]
 
@@ -196,19 +196,12 @@ def fill_watched(address: int, _time: float) -> int:
     """Fill the signals that are watched of the `PeriodArgs` at an address, and their derivatives."""
     period = unpack(address, PERIOD_ARGS)
     state = unpack(unpack(period.args, core.ADVANCE_ARGS).integration, core.INTEGRATION).x
-    size, signals, source = state.size, period.watched.size, period.plain
+    signals, source = period.watched.size, period.plain
     evaluate_plain(source, state, False)
     for s in range(signals):
         period.watched[s] = _sum_rows(period, source, s)
     for c in range(period.steps.size):
-        if c < size:
-            value = state[c]
-            state[c] = value + period.steps[c]
-            evaluate_plain(source, state, False)
-            state[c] = value
-            changed = source
-        else:
-            changed = evaluate_changed(period, state, c - size, False)
+        changed = evaluate_changed(period, state, c, False)
         for s in range(signals):
             period.slopes[s, c] = (_sum_rows(period, changed, s) - period.watched[s]) / period.steps[c]
     return 1

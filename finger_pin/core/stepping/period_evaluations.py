@@ -84,9 +84,16 @@ def evaluate_plain(address: int, state: Vector, rates: bool) -> None:
 
 @njit_inline
 def evaluate_changed(period: PeriodArgs, state: Vector, column: int, rates: bool) -> int:
-    """Evaluate at a state with what is held changed in one number; return the address of the model that has."""
-    plain = unpack(period.plain, MODEL)
-    inputs, forces, step = plain.control.tension, plain.parameters.tip_force, period.steps[state.size + column]
+    """Evaluate with one number of the state, or of what is held, changed; return the address of the model that has."""
+    plain, step = unpack(period.plain, MODEL), period.steps[column]
+    inputs, forces = plain.control.tension, plain.parameters.tip_force
+    if column < state.size:
+        value = state[column]
+        state[column] = value + step
+        evaluate_plain(period.plain, state, rates)
+        state[column] = value
+        return period.plain
+    column -= state.size
     if column < inputs.size:
         value = inputs[column]
         inputs[column] = value + step

@@ -1,4 +1,4 @@
-"""What derivatives over a period gain where the motion passes a kink, at which rates may jump.
+"""Jumps of the derivatives over a period at kinks that the motion passes, where rates may jump.
 
 A row that leaves its branch when its kink c passes zero has the rate f- before and f+ behind. Where a change makes that
 earlier, f+ acts longer by grad c . V / c', with c' = grad c . f-, so that
@@ -24,23 +24,17 @@ _LEAST_JUMP, _LEAST_ROUGH_JUMP = 1.0, 1e7
 
 
 @njit_inline
-def _fill_gradient(period: PeriodArgs, state_size: int, column: int, k: int) -> float:
+def _fill_gradient(period: PeriodArgs, column: int, k: int) -> float:
     """Fill the derivatives of a row's kink by the state and what is held; return its rate along ``period.start``."""
     state, steps, gradient, rate = period.state, period.steps, period.gradient, 0.0
     plain = unpack(period.plain, MODEL)
     evaluate_plain(period.plain, state, False)
     value = plain.work.rows[column, k]
     for c in range(gradient.size):
-        if c < state_size:
-            before = state[c]
-            state[c] = before + steps[c]
-            evaluate_plain(period.plain, state, False)
-            state[c] = before
-            gradient[c] = (plain.work.rows[column, k] - value) / steps[c]
-            rate += gradient[c] * period.start[c]
-        else:
-            changed = unpack(evaluate_changed(period, state, c - state_size, False), MODEL)
-            gradient[c] = (changed.work.rows[column, k] - value) / steps[c]
+        changed = unpack(evaluate_changed(period, state, c, False), MODEL)
+        gradient[c] = (changed.work.rows[column, k] - value) / steps[c]
+    for c in range(state.size):
+        rate += gradient[c] * period.start[c]
     return rate
 
 
@@ -58,7 +52,7 @@ def _cross(period: PeriodArgs, integration: core.Integration, model: Model, colu
         most = max(most, abs(jump[i]) / period.steps[i])
     if not most > least:
         return
-    rate = _fill_gradient(period, size, column, k)
+    rate = _fill_gradient(period, column, k)
     # Of one that comes back to its kink it is not known when it has passed that.
     if not rate * passed > 0.0:
         return

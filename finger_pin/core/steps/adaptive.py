@@ -125,16 +125,10 @@ def _pace(integration: Integration, h: float, error: float, final: bool, clipped
 @njit_always_inline
 def accept_step(args: AdvanceArgs, integration: Integration, model: Model, time: float) -> None:
     """Move to the end of an accepted step, and store the step if there is a record."""
-    x, attitude, row, live = integration.x, integration.attitude, args.record_range[0], integration.live
+    x, attitude, row = integration.x, integration.attitude, args.record_range[0]
     if row < args.times.size:
         # What is settled may be zero from here on.
-        if integration.live_count[0] == 1:
-            copy_matrix(integration.dense, args.dense[row])
-        else:
-            for part in range(integration.live_count[0]):
-                for j in range(integration.dense.shape[0]):
-                    for c in range(live[part, 0], live[part, 1]):
-                        args.dense[row, j, c] = integration.dense[j, c]
+        copy_matrix(integration.dense, args.dense[row])
     if integration.events.settle:
         call_at(integration.events.settle, args.integration, 0.0)
     copy(model.state, x)

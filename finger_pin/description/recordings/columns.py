@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from finger_pin.description.recordings.bench import Column
+from finger_pin.description.recordings.bench import Column, RecordingSettings
 from finger_pin.description.recordings.csv_files import TableFormat, read_columns
 from finger_pin.description.recordings.times import check_seconds, seconds_of_dates
 from finger_pin.description.recordings.units import APPENDED, BRACKETED, check_header, in_si, parse_unit, split_unit
@@ -131,6 +131,12 @@ class Table:
     def names_unit(self, column: Column) -> bool:
         """Return whether a column that is there has a unit or a scale, in its header or beside its name."""
         return column.unit is not None or column.scale != 1.0 or self._headers[column.column][1] is not None
+
+    def row_times(self, recording: RecordingSettings) -> NDArray[np.float64]:
+        """Return the times of the rows of a recording, shape (m,), s: from its column, or by its sample rate from 0."""
+        if recording.time is None:
+            return np.arange(self.rows) / (recording.sample_rate or np.inf)
+        return self.times("time", recording.time, recording.repeated_times)
 
     def times(
         self, key: str, column: Column, repeated: str = "refuse", *, by_hand: bool = False

@@ -6,8 +6,6 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-
 from finger_pin.description.loading import load_bench
 from finger_pin.description.recordings.bench import Column, RecordingSettings
 from finger_pin.description.recordings.columns import Table
@@ -58,9 +56,7 @@ def read_motion(entry: str, recording: RecordingSettings, units: Mapping[str, st
     path, columns = Path(recording.file), recording.inputs | recording.outputs
     cells = read_columns(f"{entry} {path.name}", path, recording)
     table = Table(entry, chosen_rows(entry, cells, recording.rows))
-    times = np.arange(table.rows) / (recording.sample_rate or np.inf)
-    if recording.time is not None:
-        times = table.times("time", recording.time, recording.repeated_times)
+    times = table.row_times(recording)
     for key in units:
         check_plain(f"{entry}.{key}", columns[key])
     return times, {key: table.column(key, columns[key], unit, missing=True) for key, unit in units.items()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -182,9 +181,8 @@ def read_recording(
         held_out = row_mask(f"{entry}.held_out", cells, settings.held_out)
         if held_out.all():
             raise InputError(f"{entry}.held_out", "leaves no row to be fitted; write true", settings.held_out)
-    time = np.arange(table.rows) / (settings.sample_rate or math.inf)
+    time = table.row_times(settings)
     if settings.time is not None:
-        time = table.times("time", settings.time, settings.repeated_times)
         time = time - time[0]
         held_out = table.at_instants(held_out) > 0.0 if len(held_out) else held_out
     speed = np.zeros(table.rows)
