@@ -44,14 +44,14 @@ def contact_rows(
     names: list[str] = []
     numbers: list[tuple[float, ...]] = []
     pieces: list[PathElement] = []
-    for one, other in itertools.combinations(solids, 2):
+    for number, (one, other) in enumerate(itertools.combinations(solids, 2)):
         pair = frozenset((one.name, other.name))
         never_touching = pair in never or (one.group == other.group and pair not in within)
         if never_touching or (one.prescribed and other.prescribed) or one.never_meets(other):
             continue
         touches = list(solid_contacts(one, other))
         for index, (a, part, w, prism) in enumerate(touches):
-            piece = _piece(a, part, w, prism)
+            piece = _piece(a, part, w, prism, number)
             names.append(f"{a.name}-{w.name}" + (f".{index}" if len(touches) > 1 else ""))
             numbers.append(tuple(law_parameters(a.surface, w.surface).values()))
             pieces.append(piece)
@@ -63,7 +63,7 @@ def contact_rows(
     return Rows("contacts", law, tuple(names), parameters, arm, paths=paths, powers=_LOSSES)
 
 
-def _piece(a: Solid, part: ContactPart, w: Solid, prism: tuple[float, ...]) -> PathElement:
+def _piece(a: Solid, part: ContactPart, w: Solid, prism: tuple[float, ...], pair: int) -> PathElement:
     """Return the gap between a part of one solid and the whole of another."""
     # Of a sphere, too, the way out of an ellipsoid is known however deep.
     curved = bool(part.third) and w.shape in ("sphere", "ellipsoid")
@@ -79,6 +79,7 @@ def _piece(a: Solid, part: ContactPart, w: Solid, prism: tuple[float, ...]) -> P
         half + part.breadth + part.radius + w.reach,
         part.breadth,
         w.reach - (0.0 if w.shape == "ellipsoid" else prism[-1]),
+        pair,
     )
 
 

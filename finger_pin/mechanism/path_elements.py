@@ -71,6 +71,7 @@ class PathElement:
         breadth: Half width of the first body's part across its points, m.
         extent: Extent of the frame's body from the frame's origin, less the rounding that looks alike however it
             turns, m; infinite for a half-space.
+        pair: Number of the pair of solids of whose contact this is a part, in order; -1 if it is alone.
     """
 
     shape: PathShape
@@ -81,6 +82,7 @@ class PathElement:
     reach: float = np.inf
     breadth: float = 0.0
     extent: float = np.inf
+    pair: int = -1
 
 
 # Compared by value, with its piece by identity: rows made anew of the same pieces have the same structure.

@@ -1,8 +1,7 @@
 """Conservative culling of contact pairs that are open, at rest and cannot close within the next steps.
 
-Within a step the path of two bodies' relative motion is at most the sum, over the coordinates that move them against
-each other, of how far each goes to and fro times its lever. A polynomial goes no farther than its Bernstein
-coefficients do. A culled pair keeps a lower bound of its gap, from which such paths are subtracted.
+A culled pair keeps a lower bound of its gap, from which paths of its bodies against each other are subtracted. Where
+all parts of two solids are culled, the pair rests: the parts share one bound.
 """
 
 from __future__ import annotations
@@ -10,12 +9,13 @@ from __future__ import annotations
 import numpy as np
 
 from finger_pin.core.addresses.law_code import ROW
+from finger_pin.core.collision.path_bounds import bound_linear_motion, bound_pair_path, bound_relative_path, distance
 from finger_pin.core.evaluation.dynamics import contact_states
+from finger_pin.core.evaluation.paths import look_at
 from finger_pin.core.jit import Indices, Matrix, Vector, njit_always_inline, njit_inline
 from finger_pin.core.tables.buffers import Work
 from finger_pin.core.tables.mechanism_parameters import Parameters
-from finger_pin.core.tables.path_movers import PIECE
-from finger_pin.core.tables.path_tables import PathParameters, PathWork
+from finger_pin.core.tables.path_tables import PathWork
 from finger_pin.core.tables.structure import Structure
 from finger_pin.mechanism.gaps.signed_distance import GAP_OUT
 
@@ -31,78 +31,11 @@ _STRAIGHT_DEFLECTION = 1e-14
 
 
 @njit_always_inline
-def record_start_gaps(structure: Structure, parameters: Parameters, pieces: PathWork) -> None:
+def record_start_gaps(parameters: Parameters, pieces: PathWork) -> None:
     """Record the gap of every active pair at the start of a step."""
-    paths, geometry = structure.paths, parameters.paths
-    for e in range(paths.columns.size):
-        if paths.columns[e] > 1 and pieces.culled[paths.row[e]] == 0:
-            pieces.clear[e], pieces.far[e] = pieces.out[e, GAP_OUT.gap], distance(geometry, e, pieces)
-
-
-@njit_inline
-def distance(geometry: PathParameters, e: int, pieces: PathWork) -> float:
-    """Return the largest distance of the core of a gap's first body from the origin of its frame, m."""
-    total = 0.0
-    for c in range(3):
-        middle = 0.5 * (pieces.local_points[e, c] + pieces.local_points[e, 3 + c])
-        total += middle * middle
-    return np.sqrt(total) + geometry.cores[e]
-
-
-@njit_always_inline
-def bound_step_motion(dense: Matrix, k: Matrix, x: Vector, end: Vector, size: int, pieces: PathWork) -> None:
-    """Bound the motion of a step: fill its interpolant's Bernstein coefficients and the path of each coordinate."""
-    last, control = k.shape[0] - 1, pieces.control
-    for j in range(size):
-        # (1 - s) x + s end + s (1 - s) (first + s second + s^2 third)
-        first, second, step = dense[0, j], dense[1, j], end[j] - x[j]
-        third = dense[2, j] if dense.shape[0] > 2 else 0.0
-        control[j, 0], control[j, 4] = x[j], end[j]
-        control[j, 1] = x[j] + 0.25 * (step + first)
-        control[j, 2] = x[j] + 0.5 * step + (first + 0.5 * second) / 3.0
-        control[j, 3] = end[j] - 0.25 * (step - first - second - third)
-        # The last stage is beside the end by the last increment.
-        pieces.travel[j] = abs(k[last, j])
-        for i in range(4):
-            pieces.travel[j] += abs(control[j, i + 1] - control[j, i])
-
-
-@njit_always_inline
-def bound_linear_motion(x: Vector, end: Vector, size: int, pieces: PathWork) -> None:
-    """Bound a motion along a straight line: fill its Bernstein coefficients and the path of each coordinate."""
-    for j in range(size):
-        for i in range(5):
-            pieces.control[j, i] = x[j] + 0.25 * i * (end[j] - x[j])
-        pieces.travel[j] = abs(end[j] - x[j])
-
-
-@njit_inline
-def bound_relative_path(structure: Structure, parameters: Parameters, e: int, pieces: PathWork) -> float:
-    """Return a bound of the relative path of a contact's bodies in the bounded motion, m."""
-    paths, geometry, control = structure.paths, parameters.paths, pieces.control
-    endless = np.isinf(geometry.extents[e])
-    total, turned = 0.0, 0.0
-    for s in range(paths.start[e], paths.start[e + 1]):
-        j, other, lever = paths.at[s], paths.opposing_coordinate[s], geometry.motion_bounds[s]
-        path = pieces.travel[j]
-        if other >= 0:
-            # Beside what the last stage is off: what both have in common moves neither.
-            for i in range(4):
-                one, two = control[j, i + 1] - control[j, i], control[other, i + 1] - control[other, i]
-                path += abs(one - two) - abs(one) - abs(two)
-            path += pieces.travel[other]
-        total += lever * path
-        if endless and paths.moves[s, PIECE.frame] > paths.moves[s, PIECE.first] and structure.kinds[j] == 0:
-            turned += path
-    return add_turning(total, turned, pieces.far[e])
-
-
-@njit_inline
-def add_turning(path: float, turned: float, far: float) -> float:
-    """Return the longest path of a point that moves by a path and turns at a distance, m."""
-    if turned == 0.0:
-        return path
-    return (path + turned * far) / (1.0 - turned) if turned < 1.0 else np.inf
+    for index in range(pieces.active_pair_count[0]):
+        e = pieces.active_pairs[index]
+        pieces.clear[e], pieces.far[e] = pieces.out[e, GAP_OUT.gap], distance(parameters.paths, e, pieces)
 
 
 @njit_inline
@@ -117,8 +50,12 @@ def list_active_pairs(structure: Structure, pieces: PathWork) -> None:
     """List the active contact pairs, and where numbers of the state may be other than zero."""
     live, first, count, parts = pieces.live, 2 * structure.prescribed.size, 0, 0
     live[0, 0], live[0, 1] = 0, first
-    for e in range(structure.contact_rows // structure.contact_arms):
-        if pieces.culled[structure.paths.row[e]] == 0:
+    for p in range(pieces.resting.size):
+        if pieces.resting[p]:
+            continue
+        for e in range(structure.paths.pair_start[p], structure.paths.pair_start[p + 1]):
+            if pieces.culled[structure.paths.row[e]]:
+                continue
             pieces.active_pairs[count] = e
             count += 1
             begin = first + structure.paths.row[e] // structure.contact_arms * (structure.contact_arms - 1)
@@ -139,27 +76,48 @@ def list_active_pairs(structure: Structure, pieces: PathWork) -> None:
         live[0, 1], pieces.live_count[0] = first + structure.state_row.size, 1
 
 
+@njit_inline
+def _wake(structure: Structure, p: int, pieces: PathWork) -> None:
+    """Bound the parts of a pair one by one again: none has come nearer than the pair has moved."""
+    pieces.resting[p] = 0
+    for e in range(structure.paths.pair_start[p], structure.paths.pair_start[p + 1]):
+        pieces.clear[e] -= pieces.pair_moved[p]
+        pieces.far[e] += pieces.pair_moved[p]
+        pieces.path[e] = pieces.pair_path[p]
+        pieces.ahead[e] = pieces.clear[e] - pieces.path[e]
+
+
+@njit_inline
+def rests(structure: Structure, parameters: Parameters, p: int, pieces: PathWork) -> bool:
+    """Return whether a pair rested and cannot close in the bounded motion; fill its path, and wake it if it may."""
+    pieces.pair_path[p] = bound_pair_path(structure, parameters, p, pieces)
+    if pieces.resting[p] and not pieces.pair_clear[p] > pieces.pair_path[p]:
+        _wake(structure, p, pieces)
+    return pieces.resting[p] > 0
+
+
 @njit_always_inline
 def activate_near(structure: Structure, parameters: Parameters, pieces: PathWork) -> None:
     """Activate the pairs that may close in the bounded motion; fill the paths of all."""
     paths = structure.paths
-    for e in range(paths.columns.size):
-        k = paths.row[e]
-        if paths.columns[e] > 1:
+    for p in range(pieces.resting.size):
+        if rests(structure, parameters, p, pieces):
+            continue
+        for e in range(paths.pair_start[p], paths.pair_start[p + 1]):
             pieces.path[e] = bound_relative_path(structure, parameters, e, pieces)
-            if pieces.culled[k]:
+            if pieces.culled[paths.row[e]]:
                 pieces.ahead[e] = pieces.clear[e] - pieces.path[e]
                 if not pieces.ahead[e] > 0.0:
-                    set_culled(structure, k, 0, pieces.culled)
+                    set_culled(structure, paths.row[e], 0, pieces.culled)
 
 
 @njit_always_inline
-def record_end_gaps(structure: Structure, parameters: Parameters, pieces: PathWork) -> None:
+def record_end_gaps(parameters: Parameters, pieces: PathWork) -> None:
     """Record the gap of every active pair at the end of a bounded motion."""
-    paths, geometry = structure.paths, parameters.paths
-    for e in range(paths.columns.size):
-        if paths.columns[e] > 1 and pieces.culled[paths.row[e]] == 0:
-            pieces.ahead[e], pieces.far[e] = pieces.out[e, GAP_OUT.gap] - GAP_ACCURACY, distance(geometry, e, pieces)
+    for index in range(pieces.active_pair_count[0]):
+        e = pieces.active_pairs[index]
+        pieces.ahead[e] = pieces.out[e, GAP_OUT.gap] - GAP_ACCURACY
+        pieces.far[e] = distance(parameters.paths, e, pieces)
 
 
 @njit_always_inline
@@ -174,38 +132,61 @@ def _straighten(structure: Structure, rows: Matrix, k: int, states: Vector) -> b
 
 
 @njit_inline
-def update_culling(structure: Structure, rows: Matrix, pieces: PathWork, states: Vector) -> bool:
-    """Cull or activate contact pairs at the end of a step, by bounds of their gaps there.
+def update_culling(structure: Structure, parameters: Parameters, work: Work, states: Vector) -> bool:
+    """Cull or activate contact pairs at the end of a step, where bodies are placed, by bounds of their gaps there.
 
     Returns:
         Whether any did.
     """
-    paths, changed = structure.paths, False
-    for e in range(paths.columns.size):
-        k = paths.row[e]
-        if paths.columns[e] == 1:
-            continue
-        may_close = not pieces.ahead[e] > _STEPS_AHEAD * pieces.path[e]
-        if pieces.culled[k]:
-            pieces.clear[e] = pieces.ahead[e]
-            pieces.far[e] += pieces.path[e]
-            if may_close:
+    paths, pieces, changed = structure.paths, work.paths, False
+    for p in range(pieces.resting.size):
+        path = pieces.pair_path[p]
+        if pieces.resting[p]:
+            if pieces.pair_clear[p] - path > _STEPS_AHEAD * path:
+                pieces.pair_clear[p] -= path
+                pieces.pair_moved[p] += path
+                continue
+            _wake(structure, p, pieces)
+        least, far, stays = np.inf, 0.0, True
+        for e in range(paths.pair_start[p], paths.pair_start[p + 1]):
+            k = paths.row[e]
+            may_close = not pieces.ahead[e] > _STEPS_AHEAD * pieces.path[e]
+            if may_close and pieces.culled[k]:
+                # Its bound may have worn off on the way.
+                look_at(paths, parameters.paths, e, work)
+                pieces.ahead[e] = pieces.out[e, GAP_OUT.gap] - GAP_ACCURACY
+                pieces.far[e] = distance(parameters.paths, e, pieces) - pieces.path[e]
+                may_close = not pieces.ahead[e] > _STEPS_AHEAD * pieces.path[e]
+            stays = stays and pieces.culled[k] > 0 and not may_close
+            if pieces.culled[k]:
+                pieces.clear[e] = pieces.ahead[e]
+                pieces.far[e] += pieces.path[e]
+                if may_close:
+                    changed = True
+                    set_culled(structure, k, 0, pieces.culled)
+            elif not may_close and pieces.active[e] == 0 and _straighten(structure, work.rows, k, states):
+                pieces.clear[e], pieces.far[e] = pieces.ahead[e], pieces.far[e] + pieces.path[e]
                 changed = True
-                set_culled(structure, k, 0, pieces.culled)
-        elif not may_close and pieces.active[e] == 0 and _straighten(structure, rows, k, states):
-            pieces.clear[e], pieces.far[e] = pieces.ahead[e], pieces.far[e] + pieces.path[e]
-            changed = True
-            set_culled(structure, k, 1, pieces.culled)
+                set_culled(structure, k, 1, pieces.culled)
+            least, far = min(least, pieces.clear[e]), max(far, pieces.far[e])
+        pieces.pair_moved[p], pieces.pair_far[p] = 0.0, far
+        if stays and least > _STEPS_AHEAD * path:
+            # All have been culled before, so that their states are zero.
+            pieces.resting[p], pieces.pair_clear[p] = 1, least
     return changed
 
 
 @njit_always_inline
 def forget_culled(structure: Structure, pieces: PathWork, first: int, values: Vector) -> None:
     """Set the states of culled contacts to zero in a vector, in which states of rows begin at a place."""
-    for k in range(0, structure.contact_rows, structure.contact_arms):
-        if pieces.culled[k]:
-            for m in range(k + 1, k + structure.contact_arms):
-                values[first + structure.state[m]] = 0.0
+    for p in range(pieces.resting.size):
+        if pieces.resting[p]:
+            continue
+        for e in range(structure.paths.pair_start[p], structure.paths.pair_start[p + 1]):
+            k = structure.paths.row[e]
+            if pieces.culled[k]:
+                for m in range(k + 1, k + structure.contact_arms):
+                    values[first + structure.state[m]] = 0.0
 
 
 @njit_inline
@@ -215,6 +196,8 @@ def activate_all_pairs(structure: Structure, work: Work) -> None:
         work.paths.culled[k] = 0
     for e in range(work.paths.path.size):
         work.paths.path[e] = 0.0
+    for p in range(work.paths.resting.size):
+        work.paths.resting[p], work.paths.pair_path[p] = 0, 0.0
     list_active_pairs(structure, work.paths)
 
 
@@ -238,17 +221,21 @@ def activate_since(
     bound_linear_motion(before, after, structure.parents.size, work.paths)
     activate_near(structure, parameters, work.paths)
     width = work.torque.size
-    for k in range(structure.contact_rows):
-        # Bent bristles tell of a contact that was closed meanwhile.
-        if structure.state[k] >= 0 and after[2 * width + structure.state[k]] != 0.0:
-            set_culled(structure, k - k % structure.contact_arms, 0, work.paths.culled)
+    for p in range(work.paths.resting.size):
+        for e in range(structure.paths.pair_start[p], structure.paths.pair_start[p + 1]):
+            for k in range(structure.paths.row[e] + 1, structure.paths.row[e] + structure.contact_arms):
+                # Bent bristles tell of a contact that was closed meanwhile.
+                if after[2 * width + structure.state[k]] != 0.0:
+                    if work.paths.resting[p]:
+                        _wake(structure, p, work.paths)
+                    set_culled(structure, structure.paths.row[e], 0, work.paths.culled)
     list_active_pairs(structure, work.paths)
 
 
 @njit_inline
 def cull_distant(structure: Structure, parameters: Parameters, work: Work, state: Vector, before: Vector) -> None:
     """Cull the pairs that are far apart at a state, and store the state for `activate_since`."""
-    record_end_gaps(structure, parameters, work.paths)
-    update_culling(structure, work.rows, work.paths, state[2 * work.torque.size :])
+    record_end_gaps(parameters, work.paths)
+    update_culling(structure, parameters, work, state[2 * work.torque.size :])
     for c in range(state.size):
         before[c] = state[c]

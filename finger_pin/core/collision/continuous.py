@@ -15,14 +15,8 @@ from typing import TypeAlias
 import numpy as np
 
 from finger_pin.core.addresses.law_code import ROW
-from finger_pin.core.collision.broad_phase import (
-    GAP_ACCURACY,
-    add_turning,
-    bound_relative_path,
-    bound_step_motion,
-    distance,
-    set_culled,
-)
+from finger_pin.core.collision.broad_phase import GAP_ACCURACY, rests, set_culled
+from finger_pin.core.collision.path_bounds import add_turning, bound_relative_path, bound_step_motion, distance
 from finger_pin.core.jit import Matrix, Vector, call_at, njit_always_inline, njit_inline
 from finger_pin.core.steps.integration import Integration
 from finger_pin.core.tables.mechanism_parameters import Parameters
@@ -209,33 +203,38 @@ def detect_missed_contacts(integration: Integration, model: Model) -> float:
     structure, parameters = model.structure, model.parameters
     pieces, rows, state = model.work.paths, model.work.rows, model.state
     paths, size, first, woken = structure.paths, structure.parents.size, NOTHING_MISSED, False
+    seen = -1
     bound_step_motion(integration.dense, integration.k, integration.x, state, size, pieces)
-    for e in range(paths.columns.size):
-        if paths.columns[e] == 1:
+    for p in range(pieces.resting.size):
+        if rests(structure, parameters, p, pieces):
             continue
-        k, path = paths.row[e], bound_relative_path(structure, parameters, e, pieces)
-        pieces.path[e] = path
-        if pieces.culled[k]:
-            pieces.ahead[e] = pieces.clear[e] - path
-            if pieces.ahead[e] > 0.0:
-                continue
-            share = _scan(integration, model, e)[0]
-            if share < NOTHING_MISSED or pieces.ahead[e] < 0.0:
-                # Until it is listed again it exerts nothing, whatever else the step has met.
-                set_culled(structure, k, 0, pieces.culled)
-                woken = True
-        else:
-            start, end = pieces.clear[e], pieces.out[e, GAP_OUT.gap]
-            pieces.ahead[e] = end - GAP_ACCURACY - path
-            if min(start, end) >= 0.0 and path < start + end:
-                continue
-            if max(start, end) < 0.0 and rows[ROW.side, k] > 0.0:
-                continue
-            ahead = pieces.ahead[e]
-            parting, meeting = _scan(integration, model, e)
-            share = parting if _is_pressed(structure, rows, k) else meeting
-            pieces.ahead[e] = ahead
-        first = min(first, share)
+        for e in range(paths.pair_start[p], paths.pair_start[p + 1]):
+            k, path = paths.row[e], bound_relative_path(structure, parameters, e, pieces)
+            pieces.path[e] = path
+            if pieces.culled[k]:
+                pieces.ahead[e] = pieces.clear[e] - path
+                if pieces.ahead[e] > 0.0:
+                    continue
+                share, seen = _scan(integration, model, e)[0], e
+                if share < NOTHING_MISSED or pieces.ahead[e] < 0.0:
+                    # Until it is listed again it exerts nothing, whatever else the step has met.
+                    set_culled(structure, k, 0, pieces.culled)
+                    woken = True
+            else:
+                start, end = pieces.clear[e], pieces.out[e, GAP_OUT.gap]
+                pieces.ahead[e] = end - GAP_ACCURACY - path
+                if min(start, end) >= 0.0 and path < start + end:
+                    continue
+                if max(start, end) < 0.0 and rows[ROW.side, k] > 0.0:
+                    continue
+                ahead = pieces.ahead[e]
+                (parting, meeting), seen = _scan(integration, model, e), e
+                share = parting if _is_pressed(structure, rows, k) else meeting
+                pieces.ahead[e] = ahead
+            first = min(first, share)
+    if seen >= 0:
+        # Bodies are where the step ends again.
+        _look(integration, model, seen, 1.0, pieces.looks[0])
     for j in range(size):
         state[j] = pieces.control[j, 4]
     return MISSED_BY_CULLING if woken else first

@@ -21,6 +21,18 @@ def extent(blocks: Blocks, b: int) -> tuple[int, int]:
     return width, 2 * width + blocks.state_start[b + 1] - blocks.state_start[b] + 1
 
 
+@njit_inline
+def add_contact_gain(
+    structure: Structure, blocks: Blocks, k: int, factor: float, gain: Vector, width: int, out: Vector
+) -> None:
+    """Add a multiple of a gain of the contact to which a row belongs, in columns of a block."""
+    first = k - k % structure.contact_arms
+    for c in range(2 * width):
+        out[c] += factor * gain[c]
+    for j in range(structure.contact_arms - 1):
+        out[2 * width + blocks.state_place[structure.state[first + 1 + j]]] += factor * gain[2 * width + j]
+
+
 @njit_always_inline
 def _join(structure: Structure, work: Work, blocks: Blocks) -> None:
     """Fill the block of every atom."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from finger_pin.core.addresses.law_code import SLOPE
 from finger_pin.core.addresses.spatial import product
-from finger_pin.core.evaluation.blocks import extent, factorise, substitute
+from finger_pin.core.evaluation.blocks import add_contact_gain, extent, factorise, substitute
 from finger_pin.core.evaluation.readings import add_readings, resolve_readings
 from finger_pin.core.jit import (
     CompiledFunction,
@@ -40,12 +40,17 @@ def _add_scaled(out: Vector, factor: float, source: Vector, size: int) -> None:
 
 
 @njit_inline
-def _terms(model: Model, begin: int, end: int, slope: float, wide: int, out: Vector) -> None:
+def _terms(model: Model, begin: int, end: int, slope: float, width: int, wide: int, out: Vector) -> None:
     """Fill the change of a weighted sum of earlier forces, times a slope."""
+    structure, linear = model.structure, model.linear
     for c in range(wide):
         out[c] = 0.0
     for e in range(begin, end):
-        _add_scaled(out, slope * model.parameters.weights[e], model.linear.gain[model.structure.terms[e]], wide)
+        k, weight = structure.terms[e], slope * model.parameters.weights[e]
+        if k < structure.contact_rows:
+            add_contact_gain(structure, linear.blocks, k, weight, linear.contact_gain[k], width, out)
+        else:
+            _add_scaled(out, weight, linear.gain[k - structure.contact_rows], wide)
 
 
 @njit_always_inline
@@ -73,7 +78,7 @@ def _load(model: Model, address: int, k: int, places: Indices, width: int, wide:
     """Fill the change of a row's load."""
     structure, parameters, linear, load = model.structure, model.parameters, model.linear, model.linear.load
     full, begin, end = wide + structure.read_states.size, structure.load_start[k], structure.load_start[k + 1]
-    _terms(model, begin, end, linear.load_slope[k], full, load)
+    _terms(model, begin, end, linear.load_slope[k], width, full, load)
     if (parameters.has_tip_force or structure.contact_rows) and structure.joint_pin[k] >= 0:
         for c in range(width):
             load[c] += linear.load_by_position[k, places[c]]
@@ -87,7 +92,7 @@ def _command(model: Model, k: int, places: Indices, width: int, wide: int) -> No
     """Fill the change of a row's input."""
     structure, control, command = model.structure, model.control, model.linear.command
     full = wide + structure.read_states.size
-    _terms(model, structure.input_start[k], structure.input_start[k + 1], 1.0, full, command)
+    _terms(model, structure.input_start[k], structure.input_start[k + 1], 1.0, width, full, command)
     channel = structure.channel[k]
     if channel >= 0:
         for c in range(width):
@@ -123,11 +128,11 @@ def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) 
     linear, slopes, blocks = model.linear, model.work.slopes, model.linear.blocks
     load, command = linear.load, linear.command
     own_places = blocks.coordinates[blocks.coordinate_start[b] : blocks.coordinate_start[b + 1]]
-    full = wide + structure.read_states.size
+    full, first = wide + structure.read_states.size, linear.contact_state_gain.shape[0]
     _fill_external_forces(model, address, g, b, width, wide)
     for index in range(blocks.row_start[b], blocks.row_start[b + 1]):
         k = blocks.rows[index]
-        row, state = linear.gain[k], structure.state[k]
+        row, state = linear.gain[k - structure.contact_rows], structure.state[k]
         of_length, of_speed = slopes[SLOPE.force_by_length, k], slopes[SLOPE.force_by_speed, k]
         of_curvature = slopes[SLOPE.force_by_curvature, k]
         of_load, of_command = slopes[SLOPE.force_by_load, k], slopes[SLOPE.force_by_command, k]
@@ -138,7 +143,7 @@ def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) 
             by_load, by_command = factor * slopes[SLOPE.rate_by_load, k], factor * slopes[SLOPE.rate_by_command, k]
             # d phi by z and by z' = g dz - r_z.
             total = slopes[SLOPE.force_by_state, k] + g * slopes[SLOPE.force_by_rate, k]
-        state_gain = linear.state_gain[max(state, 0)]
+        state_gain = linear.state_gain[max(state - first, 0)]
         for c in range(full):
             row[c] = 0.0
         if state >= 0:
@@ -270,5 +275,14 @@ def solve(linear: Linear, r: Vector, u: Vector) -> None:
         _solve_velocities(linear, begin, width, wide)
         for i in range(width):
             u[places[i]], u[whole + places[i]] = right[i], right[width + i]
-        for s in states:
-            u[2 * whole + s] = product(linear.state_gain[s], right, wide)
+        first = linear.contact_state_gain.shape[0]
+        slips = linear.contact_state_gain.shape[1] - 2 * whole
+        touching = slips * (blocks.touch_start[b + 1] - blocks.touch_start[b])
+        for c in range(touching):
+            gain, own = linear.contact_state_gain[states[c]], 2 * width + c - c % slips
+            change = product(gain, right, 2 * width)
+            for j in range(slips):
+                change += gain[2 * width + j] * right[own + j]
+            u[2 * whole + states[c]] = change
+        for s in states[touching:]:
+            u[2 * whole + s] = product(linear.state_gain[s - first], right, wide)

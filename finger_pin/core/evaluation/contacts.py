@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from finger_pin.core.addresses.law_code import ROW
 from finger_pin.core.addresses.law_code import TOUCH_SLOPE as AT
-from finger_pin.core.evaluation.blocks import extent
+from finger_pin.core.evaluation.blocks import add_contact_gain, extent
 from finger_pin.core.evaluation.paths import measure_paths, passes, push
 from finger_pin.core.jit import CompiledFunction, Matrix, Vector, call_value, njit_always_inline, njit_inline, unpack
 from finger_pin.core.tables.buffers import Work
@@ -87,24 +87,23 @@ def _invert(matrix: Matrix) -> None:
 
 
 @njit_always_inline
-def _contact_gains(structure: Structure, g: float, k: int, work: Work, linear: Linear, width: int, wide: int) -> None:
-    """Fill the gains of the rows of a contact and of its states, in the columns of its block."""
-    slopes, place, state_place = work.slopes, linear.blocks.place, linear.blocks.state_place
-    matrix, weights, states, full = (
+def _contact_gains(structure: Structure, g: float, k: int, work: Work, linear: Linear, width: int) -> None:
+    """Fill the gains of the rows of a contact and of its states, in columns of its block and of these states."""
+    slopes, place = work.slopes, linear.blocks.place
+    matrix, weights, states = (
         linear.contact_matrix,
         linear.contact_weights,
         structure.state[k + 1 : k + structure.contact_arms],
-        wide + structure.read_states.size,
     )
+    size = 2 * width + states.size
     # (g - A) dz = r_z + B (what the contact sees).
     for i in range(states.size):
         for j in range(states.size):
             matrix[i, j] = (g if i == j else 0.0) - slopes[AT.rate_by_state_1 + j, k + 1 + i]
     _invert(matrix)
     for i in range(states.size):
-        state_gain = linear.state_gain[states[i]]
-        # Those of states that rows read, too: other blocks may have had their columns there.
-        for column in range(full):
+        state_gain = linear.contact_state_gain[states[i]]
+        for column in range(size):
             state_gain[column] = 0.0
         for c in range(weights.size):
             weights[c] = 0.0
@@ -112,14 +111,14 @@ def _contact_gains(structure: Structure, g: float, k: int, work: Work, linear: L
                 weights[c] += matrix[i, j] * slopes[AT.rate_by_gap + c, k + 1 + j]
         _add_inputs(structure, k, linear, width, state_gain)
         for j in range(states.size):
-            state_gain[2 * width + state_place[states[j]]] += matrix[i, j]
+            state_gain[2 * width + j] = matrix[i, j]
     for m in range(structure.contact_arms):
-        row = linear.gain[k + m]
-        for column in range(full):
+        row = linear.contact_gain[k + m]
+        for column in range(size):
             row[column] = 0.0
         for j in range(states.size):
-            slope, state_gain = slopes[AT.force_by_state_1 + j, k + m], linear.state_gain[states[j]]
-            for column in range(full):
+            slope, state_gain = slopes[AT.force_by_state_1 + j, k + m], linear.contact_state_gain[states[j]]
+            for column in range(size):
                 row[column] += slope * state_gain[column]
         for c in range(weights.size):
             weights[c] = slopes[AT.force_by_gap + c, k + m]
@@ -127,8 +126,7 @@ def _contact_gains(structure: Structure, g: float, k: int, work: Work, linear: L
         for e in range(structure.arm_start[k + m], structure.arm_start[k + m + 1]):
             arm, target = linear.arm[e], linear.force[place[structure.arm_at[e]]]
             if arm != 0.0:
-                for column in range(wide):
-                    target[column] += arm * row[column]
+                add_contact_gain(structure, linear.blocks, k, arm, row, width, target)
 
 
 @CompiledFunction
@@ -137,9 +135,9 @@ def fill_contact_gains(address: int, g: float) -> int:
     model = unpack(address, MODEL)
     linear, blocks = model.linear, model.linear.blocks
     b = blocks.current[0]
-    width, wide = extent(blocks, b)
+    width, _ = extent(blocks, b)
     for index in range(blocks.touch_start[b], blocks.touch_start[b + 1]):
-        _contact_gains(model.structure, g, blocks.touches[index], model.work, linear, width, wide)
+        _contact_gains(model.structure, g, blocks.touches[index], model.work, linear, width)
     return 1
 
 
@@ -147,19 +145,19 @@ def fill_contact_gains(address: int, g: float) -> int:
 def add_pushes(address: int, row: float) -> int:
     """Add to the change of a row's load that of the forces of the closed contacts of its block on its pin."""
     model = unpack(address, MODEL)
-    structure, work, linear, k = model.structure, model.work, model.linear, int(row)
+    structure, work, linear, pressed = model.structure, model.work, model.linear, int(row)
     paths, pieces, blocks, load = structure.paths, work.paths, linear.blocks, linear.load
-    _, wide = extent(blocks, blocks.current[0])
+    width, _ = extent(blocks, blocks.current[0])
     for index in range(pieces.closed_count[0]):
         e = pieces.closed[index]
-        passing = passes(paths, e, structure.joint_pin[k])
+        passing = passes(paths, e, structure.joint_pin[pressed])
         if passing == 0.0 or work.rows[ROW.side, paths.row[e]] < 0.0:
             continue
-        size = max(work.rows[ROW.load, k], 1e-100)
+        size = max(work.rows[ROW.load, pressed], 1e-100)
         for m in range(3):
             share = 0.0
             for r in range(3):
-                share += passing * work.pull[k, r] * pieces.wrench[e, m, 3 + r] / size
-            for c in range(wide):
-                load[c] += share * linear.gain[paths.row[e] + m, c]
+                share += passing * work.pull[pressed, r] * pieces.wrench[e, m, 3 + r] / size
+            k = paths.row[e] + m
+            add_contact_gain(structure, blocks, k, share, linear.contact_gain[k], width, load)
     return 1

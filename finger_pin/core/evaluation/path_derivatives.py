@@ -210,5 +210,5 @@ def linearise_paths(address: int, _time: float) -> int:
         for k in range(structure.joint_pin.size):
             if structure.joint_pin[k] >= 0:
                 _turn_pushes(structure, work, k, linear.load_by_position[k])
-        partition(structure, work, linear.blocks, linear.gain)
+        partition(structure, work, linear.blocks, linear.contact_gain)
     return 1

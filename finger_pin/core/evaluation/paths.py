@@ -74,7 +74,7 @@ def turn_out(rotation: Matrix, out: Vector, first: int, vector: Vector) -> None:
 
 
 @njit_inline
-def _look(paths: PathStructure, geometry: PathParameters, e: int, work: Work) -> bool:
+def look_at(paths: PathStructure, geometry: PathParameters, e: int, work: Work) -> bool:
     """Fill value and wrenches of a piece between placed bodies; return false if it is out of reach."""
     pieces = work.paths
     _frame(paths, geometry, e, work)
@@ -95,7 +95,7 @@ def _look(paths: PathStructure, geometry: PathParameters, e: int, work: Work) ->
 def _measure(paths: PathStructure, geometry: PathParameters, e: int, work: Work) -> None:
     """Fill the value of a piece, and its wrenches."""
     pieces = work.paths
-    _look(paths, geometry, e, work)
+    look_at(paths, geometry, e, work)
     out, columns = pieces.out[e], paths.columns[e]
     pieces.active[e] = 1 if columns == 1 or out[GAP_OUT.gap] < 0.0 or work.rows[ROW.side, paths.row[e]] > 0.0 else 0
     rotation, ends, point = pieces.frame[e], pieces.ends[e], work.centre
@@ -146,7 +146,7 @@ def look(address: int, piece: float) -> int:
     model = unpack(address, MODEL)
     work, width = model.work, model.work.torque.size
     move(model.structure, model.parameters, model.state[:width], model.state[width : 2 * width], work)
-    return 1 if _look(model.structure.paths, model.parameters.paths, int(piece), work) else 0
+    return 1 if look_at(model.structure.paths, model.parameters.paths, int(piece), work) else 0
 
 
 @njit_always_inline

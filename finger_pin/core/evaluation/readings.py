@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.core.evaluation.blocks import factorise, substitute
+from finger_pin.core.evaluation.blocks import add_contact_gain, factorise, substitute
 from finger_pin.core.jit import Vector, njit_always_inline, njit_inline
 from finger_pin.core.tables.linear_systems import Linear
 from finger_pin.core.tables.mechanism_parameters import Parameters
@@ -22,12 +22,17 @@ def add_readings(structure: Structure, parameters: Parameters, k: int, slope: fl
 def resolve_readings(structure: Structure, linear: Linear, b: int, width: int, wide: int) -> bool:
     """Solve for the changes of the states that rows of a block read, and put them into its gains; false if singular."""
     blocks, matrix, solved, reads = linear.blocks, linear.read_matrix, linear.read_gain, structure.read_states.size
-    states = blocks.states[blocks.state_start[b] : blocks.state_start[b + 1]]
+    states, first = blocks.states[blocks.state_start[b] : blocks.state_start[b + 1]], linear.contact_state_gain.shape[0]
     matrix[:, :] = np.eye(reads)
     solved[:wide] = 0.0
     for s in states:
-        if structure.read_place[s] >= 0:
-            p, state_gain = structure.read_place[s], linear.state_gain[s]
+        p = structure.read_place[s]
+        if p >= 0 and s < first:
+            # States of contacts, which stand first, read no others.
+            gain = linear.contact_state_gain[s]
+            add_contact_gain(structure, blocks, structure.state_row[s], 1.0, gain, width, solved[:, p])
+        elif p >= 0:
+            state_gain = linear.state_gain[s - first]
             for c in range(reads):
                 matrix[p, c] -= state_gain[wide + c]
             for c in range(wide):
@@ -38,8 +43,8 @@ def resolve_readings(structure: Structure, linear: Linear, b: int, width: int, w
         substitute(matrix, reads, linear.read_pivots, solved[c])
     for p in range(reads):
         for s in states:
-            for c in range(wide):
-                linear.state_gain[s, c] += linear.state_gain[s, wide + p] * solved[c, p]
+            for c in range(wide if s >= first else 0):
+                linear.state_gain[s - first, c] += linear.state_gain[s - first, wide + p] * solved[c, p]
         for j in range(width):
             for c in range(wide):
                 linear.force[j, c] += linear.force[j, wide + p] * solved[c, p]

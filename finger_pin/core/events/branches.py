@@ -58,7 +58,7 @@ def freeze(address: int, _time: float) -> int:
                     kinks[k] = rows[column, k]
                     rows[ROW.side, k] = np.sign(kinks[k])
     if structure.contact_rows:
-        record_start_gaps(structure, parameters, model.work.paths)
+        record_start_gaps(parameters, model.work.paths)
     return 1
 
 

@@ -80,7 +80,7 @@ def cull_contacts(address: int, _time: float) -> int:
     integration = unpack(address, INTEGRATION)
     model = unpack(integration.model, MODEL)
     structure, paths, first = model.structure, model.work.paths, 2 * model.linear.mass.shape[0]
-    if update_culling(structure, model.work.rows, paths, model.state[first:]):
+    if update_culling(structure, model.parameters, model.work, model.state[first:]):
         list_active_pairs(structure, paths)
         forget_culled(structure, paths, first, integration.start)
         forget_culled(structure, paths, first, model.rate)

@@ -54,6 +54,7 @@ def _resolved(linear: Linear) -> tuple[Array, Array]:
     """Return the Jacobian and the derivative by time of solutions (g - J)^-1 (r + f_t), block by block."""
     blocks, whole = linear.blocks, len(linear.mass)
     size = 2 * whole + len(blocks.loose)
+    first, slips = len(linear.contact_state_gain), linear.contact_state_gain.shape[1] - 2 * whole
     jacobian, by_time = np.zeros((size, size)), np.zeros(size)
     # Of open contacts, each on its own.
     alone = 2 * whole + np.arange(len(blocks.loose))
@@ -68,7 +69,13 @@ def _resolved(linear: Linear) -> tuple[Array, Array]:
         np.fill_diagonal(factors, 1.0 / np.diag(factors))
         moving = scipy.linalg.lu_solve((factors, linear.pivots[begin:end]), linear.velocity[begin:end, :wide])
         moved = (np.eye(width, wide) + moving) / _G
-        gain = linear.state_gain[states, :wide].copy()
+        gain = np.zeros((len(states), wide))
+        touching = int(np.count_nonzero(states < first))
+        gain[touching:] = linear.state_gain[states[touching:] - first, :wide]
+        for c, state in enumerate(states[:touching]):
+            own = 2 * width + c - c % slips
+            gain[c, : 2 * width] = linear.contact_state_gain[state, : 2 * width]
+            gain[c, own : own + slips] = linear.contact_state_gain[state, 2 * width : 2 * width + slips]
         of_motion, gain[:, : 2 * width] = gain[:, : 2 * width].copy(), 0.0
         solution = np.concatenate([moved, moving, gain + of_motion @ np.concatenate([moved, moving])])
         inverse = np.linalg.inv(solution[:, :-1])

@@ -145,6 +145,7 @@ class Selection:
         part.keep_entries(paths, "leg")
         part.keep("piece", np.unique(paths.piece[part.kept["leg"]]), len(paths.columns))
         part.keep_entries(paths, "mover")
+        part.keep("pair", np.flatnonzero(np.isin(paths.pair_start[:-1], part.kept["piece"])), len(paths.pair_start) - 1)
         selected = part.select(structure)._replace(
             groups=part.select(structure.groups)._replace(first=ends[:-1], end=ends[1:]),
             contact_rows=int(np.count_nonzero(structure.touch[rows])),

@@ -113,8 +113,11 @@ class Linear(NamedTuple):
         load_by_time: dN/dt at constant S, shape (K,).
         contact_matrix: g - A of the states of a contact, inverted in place, shape (contact arms - 1,) twice.
         contact_weights: Slopes of one of its rows or states by gap, speed and slips, shape (contact arms + 1,).
-        gain: d phi, shape (K, full).
-        state_gain: d z, shape (Z, full).
+        contact_gain: d phi of contacts, in columns (r of positions, N | of velocities, N | of the contact's own
+            states), shape (contact rows, 2 N + slips).
+        contact_state_gain: d z of their states, shape (contact states, 2 N + slips).
+        gain: d phi of all other rows, shape (K less contact rows, full).
+        state_gain: d z of their states, shape (Z less contact states, full).
         load, command: Of one row, shape (full,).
         force: Sum of A^T d phi of a block, shape (N, full).
         read_gain: d z of the states that are read, shape (wide, R).
@@ -143,6 +146,8 @@ class Linear(NamedTuple):
     load_by_time: Vector
     contact_matrix: Matrix
     contact_weights: Vector
+    contact_gain: Matrix
+    contact_state_gain: Matrix
     gain: Matrix
     state_gain: Matrix
     load: Vector
@@ -164,9 +169,11 @@ class Linear(NamedTuple):
 def build_linear(structure: Structure, control: InputTable) -> Linear:
     """Allocate the linearisation of a structure."""
     count, width, states = len(structure.state), len(structure.prescribed), len(structure.state_row)
-    wide, reads = 2 * width + states + 1, len(structure.read_states)
-    full = wide + reads
-    if (needed := 8.0 * full * (count + states + width)) > (present := physical_memory()):
+    wide, reads, touching = 2 * width + states + 1, len(structure.read_states), structure.contact_rows
+    full, slips = wide + reads, touching - touching // structure.contact_arms
+    own = (touching + slips) * (2 * width + structure.contact_arms - 1)
+    needed = 8.0 * (full * (count + states - touching - slips + 2 * width) + own)
+    if needed > (present := physical_memory()):
         pairs, most = structure.contact_rows // structure.contact_arms, present / 2**30
         allowed = f"{pairs} pairs of bodies can touch, which needs {needed / 2**30:.3g} GiB of memory, of {most:.3g}"
         raise InputError("contacts", f"{allowed}; let fewer bodies touch")
@@ -184,8 +191,10 @@ def build_linear(structure: Structure, control: InputTable) -> Linear:
         load_by_time=np.zeros(count),
         contact_matrix=np.zeros((structure.contact_arms - 1,) * 2),
         contact_weights=np.zeros(structure.contact_arms + 1),
-        gain=np.zeros((count, full)),
-        state_gain=np.zeros((states, full)),
+        contact_gain=np.zeros((touching, 2 * width + structure.contact_arms - 1)),
+        contact_state_gain=np.zeros((slips, 2 * width + structure.contact_arms - 1)),
+        gain=np.zeros((count - touching, full)),
+        state_gain=np.zeros((states - slips, full)),
         load=np.zeros(full),
         command=np.zeros(full),
         force=np.zeros((width, full)),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -79,6 +81,36 @@ def motion_bounds(
                 opposing_coordinate[one], bounds[two] = two, 0.0
     others = np.array([opposing_coordinate.get(at, -1) for at, _ in movers], dtype=np.int64)
     return np.array([bounds.get(at, 0.0) for at, _ in movers]), others
+
+
+def first_of_pairs(pieces: Sequence[PathElement]) -> NDArray[np.int64]:
+    """Return the first piece of each pair of solids, which stand before all other pieces, and the end, (P + 1,)."""
+    pair = np.array([piece.pair for piece in pieces if piece.shape.columns > 1], dtype=np.int64)
+    return np.append(np.flatnonzero((np.diff(pair, prepend=-1) != 0) | (pair < 0)), len(pair))
+
+
+def pair_bounds(
+    start: NDArray[np.int64],
+    entries: Sequence[tuple[NDArray[np.int64], NDArray[np.int64]]],
+    bounds: Sequence[tuple[Array, NDArray[np.int64]]],
+) -> list[Array]:
+    """Return of every piece its bounds, and of the first one of each pair of solids the largest of its pieces.
+
+    Args:
+        start: Of every pair the first piece, and the end, shape (P + 1,).
+        entries: Of every piece the coordinates that move it, which are the same within a pair, first.
+        bounds: Of every piece what `motion_bounds` returns.
+    """
+    largest = [each for each, _ in bounds]
+    for begin, end in itertools.pairwise(start.tolist()):
+        most, others = np.max(largest[begin:end], axis=0), bounds[begin][1]
+        for at, other in enumerate(others):
+            if other >= 0:
+                # Where two pieces see each other from either side, the bound of both stands at either.
+                opposing = int(np.flatnonzero(entries[begin][0] == other)[0])
+                most[at], most[opposing] = max(most[at], most[opposing]), 0.0
+        largest[begin] = most
+    return largest
 
 
 def _length(vector: Array) -> float:

@@ -12,7 +12,7 @@ from finger_pin.core.addresses.shape_code import shape_address
 from finger_pin.core.jit import IndexTable, Indices, Layers, Matrix, Vector, refuse_copy
 from finger_pin.core.tables.axes import along
 from finger_pin.core.tables.chains import Chains
-from finger_pin.core.tables.motion_bounds import Carrying, motion_bounds
+from finger_pin.core.tables.motion_bounds import Carrying, first_of_pairs, motion_bounds, pair_bounds
 from finger_pin.core.tables.path_movers import PIECE, find_movers
 from finger_pin.mechanism.gaps.signed_distance import GAP_OUT_SIZE, GAP_SLOPE_SIZE
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, Place
@@ -51,6 +51,7 @@ class PathStructure(NamedTuple):
         moves: One where a coordinate moves the body, the first columns of `PIECE`, shape (entries, 3).
         opposing_coordinate: Coordinate that moves the other body in the same direction, -1 for none, shape (entries,).
         row: First row that uses each, shape (E,).
+        pair_start: First piece of each pair of solids that may touch, which stand before all others, shape (P + 1,).
         carries: One where a body carries another, shape (n, n).
         rows: Rows with paths, shape (R,).
         leg_start: First index of their legs, shape (R + 1,).
@@ -71,6 +72,7 @@ class PathStructure(NamedTuple):
     moves: Annotated[IndexTable, along("mover", "x")]
     opposing_coordinate: Annotated[Indices, along("mover", of="body")]
     row: Annotated[Indices, along("piece", of="row")]
+    pair_start: Annotated[Indices, along("pair", starts="piece")]
     carries: Annotated[IndexTable, along("body", "body")]
     rows: Annotated[Indices, along("path", of="row")]
     leg_start: Annotated[Indices, along("path", starts="leg")]
@@ -95,6 +97,7 @@ class PathParameters(NamedTuple):
         reach: Shape (E,), m.
         motion_bounds: Largest displacement of a point of a gap's bodies against the other body by a unit of each, shape
             (entries,), m; zero where it carries both, or only turns what looks alike.
+        pair_bounds: Likewise, at the first piece of a pair of solids: the largest of its pieces.
         cores: Extent of the core of a gap's first body from the middle of its two points, shape (E,), m.
         extents: Extent of the core of a gap's second body from its frame's origin, shape (E,), m.
         weight: Of each leg, in its row's arm and length, shape (L,).
@@ -106,6 +109,7 @@ class PathParameters(NamedTuple):
     shapes: Annotated[Matrix, along("piece", "c")]
     reach: Annotated[Vector, along("piece")]
     motion_bounds: Annotated[Vector, along("mover")]
+    pair_bounds: Annotated[Vector, along("mover")]
     cores: Annotated[Vector, along("piece")]
     extents: Annotated[Vector, along("piece")]
     weight: Annotated[Vector, along("leg")]
@@ -131,6 +135,9 @@ class PathWork(NamedTuple):
         path: Bound of the path of a gap's bodies against each other in a step, shape (E,), m.
         far: Largest distance of the first body's core from the origin of the second's frame, where the step began,
             shape (E,), m.
+        resting: One for a pair of solids that are bounded as one, all pieces culled, shape (P,); kept.
+        pair_clear, pair_far: Of a resting pair, the least `clear` and the largest `far` of its pieces, shape (P,), m.
+        pair_path, pair_moved: Bounds of the path of a pair in a step, and of all since it rests, shape (P,), m.
         travel: Path of each coordinate, to and fro, in a step, shape (N,).
         control: Bernstein coefficients of its motion, shape (N, 5).
         looks: Moments of a step, and what was seen there of a gap, columns `LOOK`, shape (LOOKS, columns).
@@ -161,6 +168,11 @@ class PathWork(NamedTuple):
     ahead: Vector
     path: Vector
     far: Vector
+    resting: Indices
+    pair_clear: Vector
+    pair_path: Vector
+    pair_moved: Vector
+    pair_far: Vector
     travel: Vector
     control: Matrix
     looks: Matrix
@@ -215,6 +227,7 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> tuple[Pat
         moves=np.concatenate([np.zeros((0, 3), dtype=np.int64), *(moves for _, moves in entries)]),
         opposing_coordinate=np.concatenate([np.zeros(0, dtype=np.int64), *(others for _, others in bounds)]),
         row=np.array([first_row[piece] for piece in pieces], dtype=np.int64),
+        pair_start=first_of_pairs(pieces),
         carries=carries,
         rows=rows,
         leg_start=np.cumsum([0, *(len(each) for each in paths if each)]),
@@ -230,6 +243,7 @@ def read_paths(paths: Sequence[Sequence[PathTerm]], chains: Chains) -> tuple[Pat
         shapes=shapes,
         reach=np.array([p.reach for p in pieces], dtype=float),
         motion_bounds=np.concatenate([np.zeros(0), *(each for each, _ in bounds)]),
+        pair_bounds=np.concatenate([np.zeros(0), *pair_bounds(structure.pair_start, entries, bounds)]),
         cores=np.array([half + piece.breadth for half, piece in zip(halves, pieces, strict=True)]),
         extents=np.array([piece.extent for piece in pieces], dtype=float),
         weight=np.array([leg.arm for leg in legs], dtype=float),
@@ -248,6 +262,7 @@ def coordinates_of_paths(paths: PathStructure, count: int, width: int) -> NDArra
 def build_path_work(paths: PathStructure, count: int, width: int, size: int) -> PathWork:
     """Allocate the memory for the pieces of K rows, with N coordinates and a state of some size."""
     pieces, entries, columns = len(paths.columns), len(paths.at), int(paths.columns.max(initial=1))
+    pairs = len(paths.pair_start) - 1
     return PathWork(
         out=np.zeros((pieces, GAP_OUT_SIZE)),
         active=np.ones(pieces, dtype=np.int64),
@@ -262,6 +277,11 @@ def build_path_work(paths: PathStructure, count: int, width: int, size: int) -> 
         ahead=np.zeros(pieces),
         path=np.zeros(pieces),
         far=np.zeros(pieces),
+        resting=np.zeros(pairs, dtype=np.int64),
+        pair_clear=np.zeros(pairs),
+        pair_path=np.zeros(pairs),
+        pair_moved=np.zeros(pairs),
+        pair_far=np.zeros(pairs),
         travel=np.zeros(width),
         control=np.zeros((width, 5)),
         looks=np.zeros((MAX_LOOKS, len(LOOK))),
