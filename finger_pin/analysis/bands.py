@@ -17,7 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from finger_pin.analysis.equilibrium import unsettled
 from finger_pin.description.caching import cached_property
+from finger_pin.description.tree_actuators import drivers
 from finger_pin.exceptions import InputError
 from finger_pin.laws.capstan import PASSIVE_FRICTION, capstan_coefficient
 from finger_pin.laws.limiter import penetration
@@ -48,14 +50,11 @@ class Bands:
                 ways, or if more than a spring pulls a tendon of the tree, or its arms depend on the posture.
         """
         bands, tree, description = cls(finger), finger.description.tree, finger.description
-        acting = [name for name, each in tree.actuators.items() if each.muscle or each.offset or each.by_length]
-        for kind, others in (("couplings", tree.couplings), ("loops", tree.loops), ("actuators", acting)):
-            for name in others:
-                raise InputError(description.entry(f"tree.{kind}", name), "must be left out: its pull is not known")
+        for _, entry, allowed in unsettled("return", finger):
+            raise InputError(entry, allowed)
         for name in dict.fromkeys((*description.canals, *bands.sprung)):
             tendon = tree.tendons[name]
-            driven = any(each.tendon == name for each in tree.actuators.values())
-            if name not in bands.sprung or driven or tendon.path or tendon.range:
+            if name not in bands.sprung or drivers(tree.actuators, "tendon", name) or tendon.path or tendon.range:
                 allowed = "must have a spring about joints, and nothing else that pulls it, to be a band"
                 raise InputError(description.entry("tree.tendons", name), allowed)
         tables = ["tendons"] * finger.routing.passive + ["tree.tendons"] * len(bands.sprung)

@@ -1,9 +1,11 @@
-"""Equilibria of a finger under given tensions."""
+"""Equilibria of a finger under given tensions, and what leaves these and other questions of statics open."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
+from typing import Any
 
 import numpy as np
 import scipy
@@ -12,7 +14,7 @@ from numpy.typing import NDArray
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
-from finger_pin.mechanism.coerce import FingerLike, as_finger, as_inputs
+from finger_pin.mechanism.coerce import FingerLike, as_finger, as_inputs, description_of
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.groups import ACTUATORS, SOURCES_WITH_END, WINCHES
 from finger_pin.mechanism.signals import FingerSignals
@@ -74,7 +76,8 @@ def equilibrium(
             their own or actuators that integrate, or it comes to no rest.
     """
     finger = as_finger(finger)
-    _check_can_rest(finger)
+    for _, entry, allowed in unsettled("posture", finger):
+        raise InputError(entry, allowed)
     command = as_inputs(finger, inputs)
     if np.any(command[: finger.routing.actuated][~finger.routing.winched] < 0.0):
         raise InputError("inputs", "a tension must not be negative", command.tolist())
@@ -183,33 +186,52 @@ class _Statics:
         return np.asarray(-scale * (inertia @ (scale * self.acceleration(y))))
 
 
-def _check_can_rest(finger: Finger) -> None:
-    """Refuse a hand of several fingers, and a finger whose rest depends on more than its inputs."""
-    description, tables = finger.description, finger.mechanism.rows
-    sheathed = [name for name, tendon in description.tendons.items() if tendon.winch and tendon.winch.pieces]
-    if sheathed:
-        allowed = "must be 0 for postures at rest: where a cord rests in its sheath depends on how it came there"
-        raise InputError(f"{description.entry('tendons', sheathed[0])}.winch.pieces", allowed)
-    has_drives = any(table.pulls and table.group not in (SOURCES_WITH_END, WINCHES) for table in tables)
-    stateful = any(table.states for table in finger.constructor_args.rows)
-    free = finger.layout.names_of("object_pose")
-    refused = {
-        "several fingers": description.hand is not None,
-        f"actuators ({', '.join(description.actuators)})": has_drives and bool(description.actuators),
-        "drives of its own": has_drives and not description.actuators,
-        f"free objects ({', '.join(free)})": bool(free),
-        "rows with states": stateful,
-    }
-    unsupported = ", ".join(what for what, there in refused.items() if there)
-    if unsupported:
-        allowed = "must be one finger with ideal sources of tension, without free objects"
-        raise InputError("finger", f"{allowed}; it has {unsupported}")
-    for name, actuator in description.tree.actuators.items():
-        if actuator.integrates or actuator.integral:
-            raise InputError(description.entry("tree.actuators", name), "integrates: it rests at no input of its own")
-        if actuator.wrench and not actuator.wrench.has_length:
-            allowed = 'must be a force with axes = "other", the slope of an energy, which falls to a rest'
-            raise InputError(f"{description.entry('tree.actuators', name)}.wrench", allowed)
+_IDEAL = "must be one finger with ideal sources of tension, without free objects"
+_SHEATH = "must be 0 for postures at rest: where a cord rests in its sheath depends on how it came there"
+_NO_ENERGY = 'must be a force with axes = "other", the slope of an energy, which falls to a rest'
+_ANGLE = "must be left out but for readings in motion: it tells no current at rest, where it depends on the angle"
+_OUT, _PULL = "must be left out", "must be left out: its pull is not known"
+_SOURCES = {SOURCES_WITH_END, WINCHES}
+# What leaves questions of statics open: these, a table of the description and an entry there, whether one has it, and
+# what is allowed. Without a table it is the finger that has it: the names of those that there are.
+_UNSETTLED: tuple[tuple[str, str, str, Callable[[Any], Any], str], ...] = (
+    ("posture", "tendons", "winch.pieces", lambda t: t.winch and t.winch.pieces, _SHEATH),
+    ("posture", "", "several fingers", lambda f: f.description.hand and f.description.hand.fingers, _IDEAL),
+    ("posture", "", "actuators", lambda f: f.description.actuators, _IDEAL),
+    ("posture", "", "drives of its own", lambda f: {r.group for r in f.mechanism.rows if r.pulls} - _SOURCES, _IDEAL),
+    ("posture", "", "free objects", lambda f: f.scene and f.scene.free, _IDEAL),
+    ("posture", "", "rows with states", lambda f: [r.group for r in f.constructor_args.rows if r.states], _IDEAL),
+    ("posture", "tree.actuators", "", lambda a: a.integrates or a.integral, "integrates: rests at no input of its own"),
+    ("posture", "tree.actuators", "wrench", lambda a: not a.has_length, _NO_ENERGY),
+    ("current goal tension", "actuators", "motor.cogging", lambda a: a.motor.cogging, _ANGLE),
+    ("tension", "actuators", "drive", lambda a: a.drive == "position", 'must be "tension"'),
+    ("goal", "actuators", "drive", lambda a: a.drive == "tension", 'must be "position"'),
+    ("goal", "actuators", "tendons", lambda a: len(a.tendons) > 1, "must be one cord"),
+    ("goal", "actuators", "tendon_pieces", lambda a: np.any(a.tendon_pieces), "must be 0"),
+    ("goal", "actuators", "motor.friction.backlash", lambda a: a.motor.friction.backlash, "must be 0"),
+    ("goal", "actuators", "position_loop.torque_off", lambda a: a.position_loop.torque_off is not None, _OUT),
+    ("return", "tree.couplings", "", bool, _PULL),
+    ("return", "tree.loops", "", bool, _PULL),
+    ("return", "tree.actuators", "", lambda a: a.muscle or a.offset or a.by_length, _PULL),
+)
+
+
+def unsettled(question: str, finger: FingerLike) -> Iterator[tuple[str, str, str]]:
+    """Yield what of a finger leaves a question of statics open: its name in its table, the entry, what is allowed.
+
+    Args:
+        question: Where the finger rests (``posture``), where a motor rests that is given its ``goal`` or a ``tension``,
+            the ``current`` of motors at rest, or whether springs ``return`` joints.
+        finger: A finger, or its description, which will do for all but postures.
+    """
+    description = description_of(finger)
+    for questions, table, entry, has, allowed in _UNSETTLED:
+        if question in questions.split():
+            for name, part in attrgetter(table)(description).items() if table else ():
+                if has(part):
+                    yield name, ".".join(filter(None, (description.entry(table, name), entry))), allowed
+            if not table and (names := has(finger)):
+                yield "", "finger", f"{allowed}; it has {entry} ({', '.join(sorted(names))})"
 
 
 def _held_by_friction(signals: FingerSignals) -> float:

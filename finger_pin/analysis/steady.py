@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finger_pin.analysis.equilibrium import equilibrium
+from finger_pin.analysis.equilibrium import equilibrium, unsettled
 from finger_pin.analysis.printing import BriefRepr
 from finger_pin.description.caching import memoised
 from finger_pin.description.finger_description import FingerDescription
@@ -68,11 +68,8 @@ def steady_state(
     """
     finger, pulled = _with_ideal_sources(finger) if isinstance(finger, Finger) else _from_description(describe(finger))
     actuators, v = finger.actuators, np.asarray(speed, dtype=float)[:, None]
-    if at_rest and np.any(actuators.cogging[0]):
-        allowed = (
-            "tells no current at rest, where it depends on the angle: leave cogging out, or take readings in motion"
-        )
-        raise InputError("finger.actuators.*.motor.cogging", allowed)
+    for _, entry, allowed in unsettled("current", finger) if at_rest else ():
+        raise InputError(entry, allowed)
     actuated = finger.routing.actuated
     postures = np.zeros((len(v), len(finger.routing.joints))) if position is None else position
     x = np.tile(pulled.rest_state(np.zeros(postures.shape[1])), (len(v), 1))

@@ -23,7 +23,7 @@ def input_ranges(finger: Finger) -> tuple[Array, Array]:
         for each, lengths in zip(description.tendons.values(), excursion, strict=False)
     ]
     for name, actuator in description.tree.actuators.items():
-        limits = actuator.reach(description.joints[actuator.joint].range if actuator.joint else None)
+        limits = actuator.reach(description.joints)
         if limits is None:
             raise InputError(
                 f"{description.entry('tree.actuators', name)}.input_range",

@@ -65,17 +65,13 @@ def start_position(description: FingerDescription) -> dict[str, float]:
 
 def idle_inputs(description: FingerDescription) -> list[str]:
     """Return the names of the actuators that the motion holds at zero, as their input has no range."""
-    return [name for name, each in description.tree.actuators.items() if _reach(description, each) is None]
-
-
-def _reach(description: FingerDescription, actuator: TreeActuator) -> tuple[float, float] | None:
-    return actuator.reach(description.joints[actuator.joint].range if actuator.joint else None)
+    return [name for name, each in description.tree.actuators.items() if each.reach(description.joints) is None]
 
 
 def _range(description: FingerDescription, actuator: TreeActuator) -> tuple[float, float]:
     """Return middle and half of the swing of an actuator's input."""
     servo = actuator.by_length * actuator.gain < 0.0
-    lower, upper = _reach(description, actuator) or (0.0, 0.0)
+    lower, upper = actuator.reach(description.joints) or (0.0, 0.0)
     share = _SERVO if servo else _MOTOR
     middle = 0.5 * (lower + upper) if servo else 0.5 * share * (lower + upper)
     return middle, 0.5 * share * (upper - lower)

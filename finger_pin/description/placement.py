@@ -125,7 +125,7 @@ def _scaled_tree(tree: Any, scale: float) -> Any:
         },
         # The length of a muscle about a hinge is an angle.
         actuators={
-            name: tree.actuators[name] if grown.get(each.joint) == 1.0 else each
+            name: tree.actuators[name] if each.units(tree.joints)[0] == "rad" else each
             for name, each in scaled.actuators.items()
         },
     )

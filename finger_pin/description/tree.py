@@ -21,7 +21,7 @@ from finger_pin.description.objects import Object
 from finger_pin.description.placement import PathSignal
 from finger_pin.description.primitives import KINDS
 from finger_pin.description.surface import BodyShape
-from finger_pin.description.tree_actuators import TreeActuator
+from finger_pin.description.tree_actuators import TreeActuator, drivers
 from finger_pin.description.tree_couplings import Coupling, coupled
 from finger_pin.description.tree_parts import Body, Keyframe, Loop, Tip, TreeJoint, TreeSolid, TreeTendon
 from finger_pin.description.validation import Description, Name, problem, suggestion
@@ -248,8 +248,8 @@ class Tree(Description):
 
     def _is_pulled(self, name: str) -> bool:
         tendon = self.tendons[name]
-        driven = any(each.tendon == name for each in self.actuators.values())
-        return driven or tendon.stiffness > 0.0 or tendon.range is not None or bool(coupled(self.couplings, name))
+        driven = drivers(self.actuators, "tendon", name) or coupled(self.couplings, name)
+        return bool(driven) or tendon.stiffness > 0.0 or tendon.range is not None
 
     def linked(self, name: str) -> dict[str, float]:
         """Return the shares of actuators' forces that pull a cord about the one joint that they drive, by actuator.
@@ -258,13 +258,13 @@ class Tree(Description):
         way share its torque. Empty for cords that have a spring, a coupling or an actuator of their own.
         """
         tendon = self.tendons[name]
-        driven = any(each.tendon == name for each in self.actuators.values())
-        if len(tendon.wound) != 1 or driven or tendon.stiffness > 0.0 or coupled(self.couplings, name):
+        driven = drivers(self.actuators, "tendon", name) or coupled(self.couplings, name)
+        if len(tendon.wound) != 1 or driven or tendon.stiffness > 0.0:
             return {}
         ((joint, radius),) = tendon.wound.items()
         sharing = sum(other * radius > 0.0 for other in self._radii_about(joint))
-        drives = {key: each.gear for key, each in self.actuators.items() if each.joint == joint}
-        return {key: -gear / (radius * sharing) for key, gear in drives.items()}
+        turning = drivers(self.actuators, "joint", joint).items()
+        return {key: -each.gear / (radius * sharing) for key, each in turning}
 
     def opposed(self, name: str) -> bool:
         """Return whether another cord pulls the other way about the only joint of a cord."""

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from finger_pin.description.parameters import Joint
 from finger_pin.description.primitives import Triple
+from finger_pin.description.tree_parts import TreeJoint
 from finger_pin.description.validation import Description, Name, choice, problem, quantity, real, vector
 from finger_pin.description.waypoints import BODY_POINT
 
@@ -102,11 +105,6 @@ class Wrench(Description):
                 raise problem(entry, 'is for axes = "other"', getattr(self, entry))
         return self
 
-    @property
-    def has_length(self) -> bool:
-        """Whether it is the force along a length."""
-        return self.axes == "other" and not any(self.torque)
-
 
 class TreeActuator(Description):
     """The drive of a joint, tendon or wrench: gain u + offset + by_length l + by_speed l'; l is gear times its length.
@@ -172,13 +170,13 @@ class TreeActuator(Description):
     def _consistent(self) -> Self:
         if sum(each is not None for each in (self.joint, self.tendon, self.wrench)) != 1:
             raise problem("", "drives one of joint, tendon and wrench")
-        if self.wrench is not None and not self.wrench.has_length:
+        if not self.has_length:
             for entry in ("by_length", "integral"):
                 if getattr(self, entry):
                     allowed = 'needs a length, which a wrench has by a force with axes = "other" alone'
                     raise problem(entry, allowed, getattr(self, entry))
         if self.muscle is not None:
-            if self.wrench is not None:
+            if self.drives[0] == "wrench":
                 raise problem("muscle", "drives a joint or a tendon, no wrench")
             for entry in sorted(self.model_fields_set - {"joint", "tendon", "gear", "input_range", "delay", "muscle"}):
                 if getattr(self, entry) != type(self).model_fields[entry].default:
@@ -198,15 +196,33 @@ class TreeActuator(Description):
                 raise problem(entry, "the lower limit must not be above the upper one", list(limits))
         return self
 
-    def reach(self, joint: Pair | None) -> Pair | None:
-        """Return the least and largest input: its range, or the goals at the ends of a joint's range; or None."""
+    @property
+    def drives(self) -> tuple[str, str]:
+        """Kind and name of what it drives: a ``joint``, a ``tendon``, or the body that a ``wrench`` pushes."""
+        if self.wrench is not None:
+            return "wrench", self.wrench.body
+        return ("joint", self.joint) if self.joint is not None else ("tendon", str(self.tendon))
+
+    @property
+    def has_length(self) -> bool:
+        """Whether what it drives has a length; of wrenches a force along the axes of another body has one."""
+        return self.wrench is None or (self.wrench.axes == "other" and not any(self.wrench.torque))
+
+    def units(self, joints: Mapping[str, TreeJoint]) -> tuple[str, str]:
+        """Return the units of its length and of its force, by the joints of its tree."""
+        kind, name = self.drives
+        return ("rad", "N m") if kind == "joint" and joints[name].kind == "hinge" else ("m", "N")
+
+    def reach(self, joints: Mapping[str, Joint]) -> Pair | None:
+        """Return the least and largest input: its range, or the goals at the ends of its joint's range; or None."""
         if self.muscle is not None:
             return self.excitations
         if self.input_range is not None:
             return self.input_range
-        if joint is None or not self.by_length * self.gain < 0.0 or self.integrates:
+        kind, name = self.drives
+        if kind != "joint" or not self.by_length * self.gain < 0.0 or self.integrates:
             return None
-        ends = [-self.by_length / self.gain * self.gear * each - self.offset / self.gain for each in joint]
+        ends = [-self.by_length / self.gain * self.gear * each - self.offset / self.gain for each in joints[name].range]
         return min(ends), max(ends)
 
     @property
@@ -229,3 +245,8 @@ class TreeActuator(Description):
         if not (self.by_length or self.by_speed or self.has_state) and self.input_range is not None:
             bounds = bounds or [(self.gain * each + self.offset) * self.gear for each in self.input_range]
         return bool(bounds) and max(bounds) <= 0.0
+
+
+def drivers(actuators: Mapping[str, TreeActuator], kind: str, name: str) -> dict[str, TreeActuator]:
+    """Return those of a tree's actuators that drive a joint or a tendon, by name."""
+    return {key: each for key, each in actuators.items() if each.drives == (kind, name)}

@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from finger_pin.description.finger_description import FingerDescription, HandSettings
 from finger_pin.description.parameters import Tendon, Winch
 from finger_pin.description.signals import SignalSettings
+from finger_pin.description.tree_actuators import drivers
 from finger_pin.description.validation import problem, suggestion
 
 
@@ -17,7 +18,7 @@ def with_winches(finger: FingerDescription, tendons: Sequence[str]) -> FingerDes
     """
     driven = {tendon for each in finger.actuators.values() for tendon in each.tendons}
     tree, pulled = finger.tree, {*finger.tendons, *(each.along for each in finger.tendons.values())}
-    pulled |= {each.tendon for each in tree.actuators.values()}
+    pulled |= {name for name in tree.tendons if drivers(tree.actuators, "tendon", name)}
     added = {name: Tendon(along=name, winch=Winch()) for name in tree.tendons if name in tendons and name not in pulled}
     added |= {
         name: tendon.updated(winch=Winch())
@@ -66,9 +67,8 @@ def check_winding(
     for name in lengths:
         entry = f"controller.tendon_winding.{name}"
         instead = f"controller.spool_angle.{name}" if name in motors else ""
-        for servo, actuator in finger.tree.actuators.items():
-            if actuator.tendon == name:
-                instead = f"the input of its actuator, controller.inputs.{servo}"
+        for servo in drivers(finger.tree.actuators, "tendon", name):
+            instead = f"the input of its actuator, controller.inputs.{servo}"
         _check_name(entry, name, "actuated tendon", names, instead)
         if name in winder:
             motor = winder[name]

@@ -12,7 +12,7 @@ from numpy.polynomial import Polynomial
 
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.tree import Tree
-from finger_pin.description.tree_actuators import TreeActuator, Wrench
+from finger_pin.description.tree_actuators import TreeActuator
 from finger_pin.description.tree_couplings import Coupling
 from finger_pin.description.tree_parts import Keyframe
 from finger_pin.exceptions import InputError
@@ -84,32 +84,30 @@ def add_actuators(
         limits = {"ctrllimited": "true", "ctrlrange": numbers(0.0, tendon.maximum_tension or _MAX_TENSION)}
         ET.SubElement(table, "motor", {"name": name, "tendon": tendon.along or name, "gear": "-1", **limits})
     for k, (name, actuator) in enumerate(description.tree.actuators.items()):
-        attributes = {"name": name, "gear": numbers(actuator.gear)}
-        if actuator.wrench:
-            entry = f"{description.entry('tree.actuators', name)}.wrench"
-            attributes |= _at_sites(entry, k, actuator.wrench, actuator.gear, description.tree, bodies)
-        else:
-            attributes |= {"joint": actuator.joint} if actuator.joint else {"tendon": str(actuator.tendon)}
+        entry, attributes = description.entry("tree.actuators", name), {"name": name, "gear": numbers(actuator.gear)}
+        attributes |= _at_sites(entry, k, actuator, description.tree, bodies) or dict([actuator.drives])
         attributes |= _limits("ctrl", actuator.input_range) | _limits("force", actuator.force_range)
         if actuator.delay:
             samples = math.ceil(actuator.delay / min(step, _DELAY_STEP)) + 2
             attributes |= {"delay": numbers(actuator.delay), "nsample": str(samples)}
-        kind, law = _law(description.entry("tree.actuators", name), actuator)
+        kind, law = _law(entry, actuator)
         ET.SubElement(table, kind, attributes | law)
 
 
 def _at_sites(
-    entry: str, k: int, wrench: Wrench, gear: float, tree: Tree, bodies: Mapping[str | None, ET.Element]
+    entry: str, k: int, actuator: TreeActuator, tree: Tree, bodies: Mapping[str | None, ET.Element]
 ) -> dict[str, str]:
-    """Return what makes an actuator the k-th wrench, with the sites that it acts at."""
+    """Return what makes the k-th actuator a wrench, with the sites that it acts at; nothing if it is none."""
+    if (wrench := actuator.wrench) is None:
+        return {}
     site, refsite = f"wrench_{k}", f"wrench_{k}_from"
     ET.SubElement(bodies[wrench.body], "site", name=site, pos=numbers(*wrench.position))
-    attributes = {"site": site, "gear": numbers(*(gear * each for each in (*wrench.force, *wrench.torque)))}
+    attributes = {"site": site, "gear": numbers(*(actuator.gear * each for each in (*wrench.force, *wrench.torque)))}
     if wrench.axes == "body":
         return attributes
     if any(wrench.force) and not tree.movers(wrench.other) <= tree.movers(wrench.body):
         allowed = "is not written: MuJoCo lets a force react at refsite, as here where that is on the base or carries"
-        raise InputError(f"{entry}.other", f"{allowed} {wrench.body}", wrench.other)
+        raise InputError(f"{entry}.wrench.other", f"{allowed} {wrench.body}", wrench.other)
     ET.SubElement(bodies[wrench.other], "site", name=refsite, pos=numbers(*wrench.other_position))
     return attributes | {"refsite": refsite}
 

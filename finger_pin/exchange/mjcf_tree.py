@@ -102,12 +102,10 @@ class _Writer(BodyWriter):
         squares = [tendon.stiffness * of_tendons[name] for name, tendon in tendons]
         squares += [stiffness * of_joints[name] for name, stiffness in springs.items()]
         for actuator in self.tree.actuators.values():
+            kind, name = actuator.drives
+            mobility = {"joint": of_joints, "tendon": of_tendons, "wrench": self.mobility.bodies}[kind][name]
             if actuator.wrench:
-                mobility = (
-                    self.mobility.bodies[actuator.wrench.body] * float(np.linalg.norm(actuator.wrench.force)) ** 2
-                )
-            else:
-                mobility = of_joints[actuator.joint] if actuator.joint else of_tendons[str(actuator.tendon)]
+                mobility *= float(np.linalg.norm(actuator.wrench.force)) ** 2
             squares.append(abs(actuator.by_length) * actuator.gear**2 * mobility)
         stops = [tendon.limit_stiffness * of_tendons[name] for name, tendon in tendons if tendon.range]
         if self.limits:

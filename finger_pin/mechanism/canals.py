@@ -17,6 +17,7 @@ import numpy as np
 
 from finger_pin.description.cords import Cord
 from finger_pin.description.finger_description import FingerDescription
+from finger_pin.description.tree_actuators import drivers
 from finger_pin.description.tree_couplings import coupled
 from finger_pin.laws.capstan import CANAL_FRICTION, CORD_TENSION
 from finger_pin.mechanism.groups import BRANCHES, CANALS, CORDS, ELASTIC, SOURCES, TENDON_LOSSES, WRAPS
@@ -136,10 +137,9 @@ class Canals:
         if tendon.range is not None:
             sources["tendon_limit", name] = -1.0
             one_way &= tendon.joints is None and tendon.range[0] <= 0.0
-        for key, actuator in tree.actuators.items():
-            if actuator.tendon == name:
-                sources[actuator_table(actuator), key] = -actuator.gear
-                one_way &= actuator.only_pulls
+        for key, actuator in drivers(tree.actuators, "tendon", name).items():
+            sources[actuator_table(actuator), key] = -actuator.gear
+            one_way &= actuator.only_pulls
         for key, part in coupled(tree.couplings, name).items():
             sources["coupling", key] = part
             one_way = False

@@ -117,10 +117,9 @@ def _about(joint: str, radius: float = -1.0) -> Cord:
 def _driven(actuator: TreeActuator, routes: TendonPaths) -> tuple[Array, Sequence[PathTerm]]:
     """Return the arm of what an actuator drives, shape (n,), and its path."""
     if actuator.wrench:
-        legs = wrench_legs(routes.placed, actuator.wrench, actuator.gear)
-        return np.zeros(len(routes.description.joints)), legs
-    cord = _about(actuator.joint) if actuator.joint else routes.cords[str(actuator.tendon)]
-    (arm,), (path,) = routes.along([cord], actuator.gear)
+        return np.zeros(len(routes.description.joints)), wrench_legs(routes.placed, actuator.wrench, actuator.gear)
+    kind, name = actuator.drives
+    (arm,), (path,) = routes.along([_about(name) if kind == "joint" else routes.cords[name]], actuator.gear)
     return arm, path
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 
 import numpy as np
 import xarray as xr
@@ -57,14 +57,8 @@ def actuators_by_unit(result: xr.Dataset, group: str) -> dict[str, list[str]]:
         result: Of a hand that is given as a tree.
         group: The table of the actuators, such as ``actuator``.
     """
-    tree, slides = read_scene(result.attrs).finger.tree, _slide_joints(result)
-
-    def units() -> Iterator[tuple[str, str]]:
-        for name in map(str, result[group].values):
-            joint = tree.actuators[name].joint
-            yield ("N" if joint is None or joint in slides else "N m"), name
-
-    return _group_by_key(units())
+    tree = read_scene(result.attrs).finger.tree
+    return _group_by_key((tree.actuators[name].units(tree.joints)[1], name) for name in map(str, result[group].values))
 
 
 def _slide_joints(result: xr.Dataset) -> set[str]:

@@ -190,6 +190,10 @@ def test_what_is_no_band_is_named():
     ):
         with pytest.raises(fp.InputError, match=rf"finger\.tree\.tendons\.band.*{says}"):
             fp.analysis.spring_return(FingerDescription.model_validate(as_tree(**spring)))
+    described = as_tree()
+    described["tree"]["actuators"] = {"motor": {"joint": "a"}, "helper": {"joint": "a", "offset": 0.1}}
+    with pytest.raises(fp.InputError, match=r"^finger\.tree\.actuators\.helper: must be left out"):
+        fp.analysis.spring_return(FingerDescription.model_validate(described))
 
 
 def test_inverse_kinematics_bends_a_banded_finger_freely_and_a_coupled_one_by_its_slack():

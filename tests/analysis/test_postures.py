@@ -71,6 +71,9 @@ def test_a_finger_with_a_passive_tendon_rests_and_what_cannot_is_told():
         equilibrium(finger, [1.0, -1.0, 1.0, 1.0])
     with pytest.raises(fp.InputError, match=r"ideal sources .* it has actuators \(M1, M2, M3, M4\)"):
         equilibrium(fp.Finger(fp.load_scenario("servo").finger), np.ones(4))
+    around = fp.load_scenario("grasp").environment.objects
+    with pytest.raises(fp.InputError, match=r"^finger: .* it has free objects \(cylinder\)"):
+        equilibrium(fp.Finger("planar", objects=around), np.ones(4))
 
 
 @pytest.mark.parametrize("slew", [None, 1.2])
@@ -84,3 +87,6 @@ def test_actuators_with_a_lag_rest_where_their_settled_force_bends_the_spring(sl
     finger = finger.updated(tree=finger.tree.updated(actuators=actuators))
     for command, angle in ((0.3, 0.25), (-2.0, -1.0 / 3.0)):
         assert equilibrium(finger, {"late": command}).position[0] == pytest.approx(angle, abs=1e-9)
+    summing = {"late": finger.tree.actuators["late"].updated(time_constant=0.0, slew=None, integrates=True)}
+    with pytest.raises(fp.InputError, match=r"^finger\.tree\.actuators\.late: integrates"):
+        equilibrium(finger.updated(tree=finger.tree.updated(actuators=summing)), {"late": 0.1})

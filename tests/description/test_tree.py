@@ -44,6 +44,21 @@ def test_the_tree_itself_is_taken():
     assert fp.Finger(changed()).mechanism.channels == 2
 
 
+def test_an_actuator_turns_a_hinge_by_rad_and_n_m_and_moves_all_else_by_m_and_n():
+    targets = {
+        "turn": {"joint": "hinge"},
+        "cord": {"tendon": "sum"},
+        "jet": {"wrench": {"body": "tip", "force": [1, 0, 0]}},
+    }
+    for kind, units in (("hinge", ("rad", "N m")), ("slide", ("m", "N"))):
+        tree = changed(
+            tree__actuators=targets, tree__joints__hinge__kind=kind, tree__tendons__sum__joints__hinge=1.0
+        ).tree
+        found = {name: (each.drives, each.units(tree.joints)) for name, each in tree.actuators.items()}
+        others = {"cord": (("tendon", "sum"), ("m", "N")), "jet": (("wrench", "tip"), ("m", "N"))}
+        assert found == {"turn": (("joint", "hinge"), units)} | others
+
+
 def test_a_cord_has_a_leg_from_point_to_point_of_its_path_with_what_it_may_wrap_between():
     """The hinge moves one end of each; the tip is fixed to the link, and the wrap to the base."""
     places = {"a": None, "b": "link", "over": None, "c": "tip", "pulley": None, "d": None, "e": "link"}

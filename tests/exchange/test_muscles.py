@@ -87,7 +87,7 @@ def test_numbers_are_read_written_and_bound_actions(tmp_path):
     muscles = {name: each.muscle for name, each in scenario.finger.tree.actuators.items()}
     assert muscles["flexor"] == Muscle(force=20.0, length_range=(0.035, 0.06))
     assert muscles["extensor"].force == pytest.approx(50.0 / model.actuator_acc0[1])
-    assert [each.reach(None) for each in scenario.finger.tree.actuators.values()] == [
+    assert [each.reach(scenario.finger.joints) for each in scenario.finger.tree.actuators.values()] == [
         (0.0, 1.0),
         (0.0, 1.0),
         (0.0, 0.8),

@@ -213,25 +213,29 @@ def test_a_motor_in_tension_drive_settles_the_finger_up_to_its_stall_torque(tmp_
 
 
 PLAY, OFF = MOTOR | {"friction": {"coulomb": 0.0, "backlash": 0.01}}, {"proportional": 2.3, "torque_off": 1.0}
-GOAL = ["spool_angle.servo"]
+GOAL, TENSION = ["spool_angle.servo"], {"drive": "tension", "position_loop": None}
+COGGED = MOTOR | {"cogging": {"amplitude": 0.01, "per_turn": 20.0}}
 
 
 @pytest.mark.parametrize(
     ("servo", "inputs", "change", "said"),
     [
+        (TENSION, GOAL, {}, r'spool_angle.servo: tells no rest: finger.actuators.servo.drive must be "position"$'),
+        ({"motor": PLAY}, GOAL, {}, "servo.motor.friction.backlash must be 0"),
+        ({"motor": PLAY, "tendon_pieces": 4}, GOAL, {}, "servo.tendon_pieces must be 0, and .*backlash must be 0"),
+        ({"motor": COGGED}, GOAL, {}, "no rest: .*servo.motor.cogging must be left out"),
         (
-            {"drive": "tension", "position_loop": None},
-            GOAL,
+            {"motor": COGGED, **TENSION},
+            ["tendon_command.flexor"],
             {},
-            r'servo must have drive = "position".*it has drive = "ten',
+            "lack what servo rests at: .*servo.motor.cogging",
         ),
-        ({"motor": PLAY}, GOAL, {}, "it has motor.friction.backlash"),
-        ({"position_loop": OFF}, GOAL, {}, "it has position_loop.torque_off"),
+        ({"position_loop": OFF}, GOAL, {}, "servo.position_loop.torque_off must be left out"),
         (
             {},
             ["tendon_command.flexor"],
             {},
-            "one.inputs: lack what servo in position drive rests at: spool_angle.servo",
+            r'one.inputs: lack what servo rests at: spool_angle.servo, or .*servo.drive must be "tension"',
         ),
         ({}, [*GOAL, "tendon_winding.flexor"], {}, "is of the same cord as spool_angle.servo: leave one out"),
         ({}, ["spool_angle.motor"], {}, "there is no motor; there are servo"),

@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from finger_pin.analysis import rubbing_cords, settled_posture, steady_state
+from finger_pin.analysis.equilibrium import unsettled
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.loading import read_scenario
 from finger_pin.description.parameters import Winch
@@ -207,13 +208,11 @@ class SteadyReadings(RecordingModel):
             )
             raise InputError(f"{self._entry}.speed", allowed)
         tensions = {each.partition(".")[2] for each in self.recording.inputs if each.startswith("spool_tension.")}
-        for motor, actuator in self.scenario.finger.actuators.items():
-            tendon = actuator.tendons[0]
-            told = {*actuator.tendons} <= {*self.wound_tendons.values()} | tensions
-            if (actuator.drive == "position" or actuator.motor.cogging) and not told:
-                why = "in position drive" if actuator.drive == "position" else "with cogging"
-                allowed = f"lack what {motor} {why} rests at: spool_angle.{motor}, or spool_tension.{tendon}"
-                raise InputError(f"{self._entry}.inputs", allowed)
+        for motor, entry, allowed in unsettled("tension", self.scenario.finger):
+            tendons = self.scenario.finger.actuators[motor].tendons
+            if not {*tendons} <= {*self.wound_tendons.values()} | tensions:
+                inputs = f"spool_angle.{motor}, or spool_tension.{tendons[0]}"
+                raise InputError(f"{self._entry}.inputs", f"lack what {motor} rests at: {inputs}, or {entry} {allowed}")
 
     def _wound_tendon(self, finger: FingerDescription, name: str) -> str:
         """Return the tendon that an input winds; refuse a motor whose goal does not tell where it rests."""
@@ -223,22 +222,10 @@ class SteadyReadings(RecordingModel):
         motor = label if variable == "spool_angle" else self._motor_of_tendon.get(label)
         if motor is None:
             return label
-        actuator = finger.actuators[motor]
-        reasons = {
-            f'drive = "{actuator.drive}"': actuator.drive != "position",
-            "several cords": len(actuator.tendons) > 1,
-            "motor.friction.backlash": actuator.motor.friction.backlash > 0.0,
-            "motor.cogging": actuator.motor.cogging is not None,
-            "tendon_pieces": bool(np.any(actuator.tendon_pieces)),
-            "position_loop.torque_off": actuator.position_loop.torque_off is not None,
-        }
-        unsupported = " and ".join(what for what, there in reasons.items() if there)
-        if unsupported:
-            allowed = (
-                f'tells no rest: finger.actuators.{motor} must have drive = "position", one cord, no play, no cogging'
-            )
-            raise InputError(f"{self._entry}.inputs.{name}", f"{allowed}, and no torque_off; it has {unsupported}")
-        return actuator.tendons[0]
+        reasons = [f"{entry} {allowed}" for each, entry, allowed in unsettled("goal", finger) if each == motor]
+        if reasons:
+            raise InputError(f"{self._entry}.inputs.{name}", f"tells no rest: {', and '.join(reasons)}")
+        return finger.actuators[motor].tendons[0]
 
     def _index(self, where: str, label: str, names: Sequence[str]) -> int:
         if label not in names:

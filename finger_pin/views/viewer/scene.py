@@ -108,9 +108,9 @@ class Scene:
         tree = self.geometry.description.tree
         path_names = {tendon["name"] for tendon in self.tendons if len(self.strands) in tendon["strand"]}
         names = {name if name in tree.tendons else name.rpartition(".")[0] for name in path_names}
-        drives = {tendon.tendon: tendon for tendon in tree.actuators.values() if tendon.tendon in names}
-        kinds = {"muscles" if tendon.muscle else "actuators" for tendon in drives.values()}
-        kinds |= {"springs"} if names - {*drives} else set()
+        drives = {each.drives: each for each in tree.actuators.values()}
+        pulling = [drives.get(("tendon", name)) for name in names]
+        kinds = {("muscles" if each.muscle else "actuators") if each else "springs" for each in pulling}
         return f"cords that {' and '.join(sorted(kinds))} pull; their tension is not shown" if names else ""
 
     def header(
