@@ -95,13 +95,13 @@ def inverse_kinematics(
     # What is moved along paths stays.
     low = np.where(finger.led_joints, preferred - _PATH_MARGIN, low)
     high = np.where(finger.led_joints, preferred + _PATH_MARGIN, high)
-    coupling = PassiveCoupling.inextensible(finger.routing, finger.tendons.slack)
+    coupling = PassiveCoupling.from_routing(finger.routing, finger.tendons.slack, bands=False)
     free = coupling.free
     followers, free_matrix = list(coupling.followers), coupling.matrix[:, free]
     body, constraints = finger.rigid_body, _constraints(finger)
 
     def residuals(angles: Array) -> Array:
-        theta = free_matrix @ angles + coupling.offset
+        theta = coupling.posture(angles)
         # A driven joint has a range as well: what is beyond it counts as if the tip were as far away, m/rad.
         beyond = np.maximum(0.0, low - theta)[followers] + np.maximum(0.0, theta - high)[followers]
         misfit = _CONSTRAINT_WEIGHT * constraints(theta)[0]
@@ -109,7 +109,7 @@ def inverse_kinematics(
         return np.concatenate([body.tip_position(theta) - target, beyond, misfit, distance])
 
     def slopes(angles: Array) -> Array:
-        theta = free_matrix @ angles + coupling.offset
+        theta = coupling.posture(angles)
         side = (theta > high).astype(float) - (theta < low)
         misfit = _CONSTRAINT_WEIGHT * constraints(theta)[1] @ free_matrix
         beyond = (side[:, None] * free_matrix)[followers]
@@ -126,7 +126,7 @@ def inverse_kinematics(
         best = scipy.optimize.least_squares(
             residuals, inside, slopes, (low[free], high[free]), xtol=1e-15, ftol=1e-15, gtol=1e-15
         )
-        solutions.append((float(best.cost), free_matrix @ best.x + coupling.offset))
+        solutions.append((float(best.cost), coupling.posture(best.x)))
         tip_reached = np.linalg.norm(residuals(best.x)[: 3 + len(followers)]) < 0.01 * _REACHED_DISTANCE
         if tip_reached and np.linalg.norm(constraints(solutions[-1][1])[0]) < 0.01 * _REACHED_DISTANCE:
             break

@@ -70,7 +70,7 @@ def self_locking_map(
     one_finger(finger.description)
     refuse_without_tendons(finger.description)
     routing, limiter = finger.routing, finger.stroke_limiter
-    coupling = PassiveCoupling.inextensible(routing, finger.tendons.slack)
+    coupling = PassiveCoupling.from_routing(routing, finger.tendons.slack, bands=False)
     free = [routing.joints[index] for index in coupling.free]
     map_joints = tuple(free[-2:]) if joints is None else tuple(joints)
     if len(map_joints) not in (1, 2) or len(set(map_joints)) < len(map_joints):
@@ -86,7 +86,7 @@ def self_locking_map(
     shape = (samples,) * len(axes)
     postures = np.tile(base, (*shape, 1))
     postures[..., columns] = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    flat = (postures @ coupling.matrix.T + coupling.offset).reshape(-1, len(base))
+    flat = coupling.posture(postures[..., coupling.free]).reshape(-1, len(base))
     tip = np.array([finger.rigid_body.tip_position(theta) for theta in flat])
     coefficient, tension = _worst_directions(finger, flat, expand(minimum_tension, len(routing.tendons)))
     return SelfLockingMap(

@@ -46,7 +46,7 @@ def taut_posture(
     stiffness = np.array([0.0 if each is None else each.stiffness for each in springs])
 
     def misfit(base: Array) -> Array:
-        theta = coupling.matrix @ base + coupling.offset
+        theta = coupling.posture(base[coupling.free])
         motors = finger.layout.unpack(finger.rest_state(theta)).motor_position[told]
         stored = np.sqrt(0.5 * stiffness) * (theta - finger.springs.rest)
         return np.concatenate([(motors - angles) / _MISFIT, stored, _NEAR * (base - near)])
@@ -55,4 +55,4 @@ def taut_posture(
     solved = scipy.optimize.least_squares(misfit, np.clip(near, *bounds), bounds=bounds)
     by_joints = _MISFIT * solved.jac[: len(told)]
     still = np.eye(len(near)) - np.linalg.pinv(by_joints, rcond=1e-6) @ by_joints
-    return coupling.matrix @ solved.x + coupling.offset, coupling.matrix @ still
+    return coupling.posture(solved.x[coupling.free]), coupling.matrix @ still

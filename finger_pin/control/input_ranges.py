@@ -14,13 +14,13 @@ _DEFAULT_MAXIMUM = 20.0
 
 def input_ranges(finger: Finger) -> tuple[Array, Array]:
     """Return least and largest inputs: tensions or, of winches, lengths, and what the actuators of a tree take."""
-    description, winched = finger.description, finger.routing.winched
+    description, winched, cords = finger.description, finger.routing.winched, finger.description.drive_cords
     excursion = finger.excursion(_corners(finger)).T if winched.any() else np.zeros((len(winched), 1))
     ranges = [
         (0.0, each.maximum_tension or _DEFAULT_MAXIMUM)
         if each.winch is None
-        else (lengths.min(), lengths.max() + (each.maximum_tension or _DEFAULT_MAXIMUM) / each.winch.stiffness)
-        for each, lengths in zip(description.tendons.values(), excursion, strict=False)
+        else (lengths.min(), lengths.max() + (each.maximum_tension or _DEFAULT_MAXIMUM) / cords[name].stiffness)
+        for (name, each), lengths in zip(description.tendons.items(), excursion, strict=False)
     ]
     for name, actuator in description.tree.actuators.items():
         limits = actuator.reach(description.joints)

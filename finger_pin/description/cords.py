@@ -7,10 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from finger_pin.description.actuators import Actuator
 from finger_pin.description.parameters import Tendon
-from finger_pin.description.validation import problem
+from finger_pin.description.validation import expand, problem
 from finger_pin.description.waypoints import Waypoint
 from finger_pin.typing import Array
+
+_OF_SPOOLS = ("tendon_rigidity", "tendon_length", "tendon_damping", "tendon_pieces", "tendon_hysteresis", "pretension")
 
 
 class CordElement(NamedTuple):
@@ -174,6 +177,36 @@ class Cord(NamedTuple):
 
 def _crossed(elements: Iterable[CordElement]) -> frozenset[str]:
     return frozenset[str]().union(*(element.crossed for element in elements))
+
+
+class DriveCord(NamedTuple):
+    """The cord from a winch or a spool to the finger.
+
+    Attributes:
+        stiffness: K, N/m.
+        damping: D, N s/m.
+        pieces: Number of pieces that stretch in its sheath; 0 for none.
+        hysteresis: h.
+        slack: e0, by which it is stretched with the spool and all joints at zero, m.
+    """
+
+    stiffness: float
+    damping: float
+    pieces: int
+    hysteresis: float = 0.0
+    slack: float = 0.0
+
+
+def drive_cords(tendons: Mapping[str, Tendon], actuators: Mapping[str, Actuator]) -> dict[str, DriveCord]:
+    """Return the cords from winches and from spools of motors, by the tendon that they pull."""
+    winches = {name: each.winch for name, each in tendons.items() if each.winch}
+    cords = {name: DriveCord(winch.stiffness, winch.damping, winch.pieces) for name, winch in winches.items()}
+    for each in actuators.values():
+        columns = [expand(getattr(each, key), len(each.tendons)).tolist() for key in _OF_SPOOLS]
+        for name, rigidity, length, damping, pieces, hysteresis, tension in zip(each.tendons, *columns, strict=True):
+            stiffness = rigidity / length
+            cords[name] = DriveCord(stiffness, damping, int(pieces), hysteresis, tension / stiffness)
+    return cords
 
 
 def check_tendons(tendons: Mapping[str, Tendon], joints: tuple[str, ...], paths: tuple[str, ...]) -> None:

@@ -12,8 +12,6 @@ from finger_pin.description.routing import Routing
 from finger_pin.exceptions import InputError
 from finger_pin.typing import Array
 
-_NO_SLACK = np.zeros(1)
-
 
 def slack_lengths(finger: FingerDescription) -> Array:
     """Return l_0, how much longer passive tendons are, relaxed, than their way at theta = 0, shape (p,), m."""
@@ -29,7 +27,7 @@ class PassiveCoupling:
     the tendon, free of friction, carries its desired tension.
 
     Attributes:
-        matrix: Shape (n, n); theta^d = matrix @ base + offset.
+        matrix: Shape (n, n), the derivative of theta^d by the angles of all joints; zero by those of followers.
         offset: Shape (n,), rad.
         followers: Indices of the follower joints.
     """
@@ -39,26 +37,18 @@ class PassiveCoupling:
     followers: tuple[int, ...]
 
     @classmethod
-    @memoised(lambda _, routing, *numbers, **flags: (routing, *(each.tobytes() for each in numbers), *flags.items()))
+    @memoised(lambda _, routing, length, **flags: (routing, length.tobytes(), *flags.items()))
     def from_routing(
-        cls,
-        routing: Routing,
-        tension: Array,
-        stiffness: Array,
-        slack: Array = _NO_SLACK,
-        *,
-        needed: bool = True,
-        bands: bool = True,
+        cls, routing: Routing, length: Array, *, needed: bool = True, bands: bool = True
     ) -> PassiveCoupling:
-        """Solve H_c theta^d = -l_0 - f^d / K_t for the follower joints.
+        """Solve H_c theta^d = -l_0 - f_5^d / K_t for the follower joints, (20); without tensions it is (4).
 
         Args:
             routing: The routing.
-            tension: f_5^d, shape (p,), N.
-            stiffness: K_t, shape (p,), N/m.
-            slack: l_0, shape (p,), m, as `slack_lengths` returns it.
+            length: l_0 + f_5^d / K_t, shape (p,), m, by which tendons are longer than their way at theta = 0.
             needed: Whether to refuse tendons that determine a joint twice, rather than let no joint follow.
-            bands: Whether the last joint of a tendon that pulls all of its joints one way follows, too.
+            bands: Whether the last joint of a tendon that pulls all of its joints one way follows, too: a band, which
+                stretches.
         """
         size = len(routing.joints)
         rows, followers = [], []
@@ -79,16 +69,13 @@ class PassiveCoupling:
             raise InputError("finger.tendons", f"the passive tendons {names} determine the same joint twice")
         matrix[followers] = 0.0
         matrix[followers] = -np.linalg.solve(driven, coupling @ matrix)
-        offset[followers] = -np.linalg.solve(driven, (slack + tension / stiffness)[rows])
+        offset[followers] = -np.linalg.solve(driven, length[rows])
         return cls(matrix, offset, tuple(followers))
 
-    @classmethod
-    def inextensible(cls, routing: Routing, slack: Array = _NO_SLACK) -> PassiveCoupling:
-        """Return the coupling by tendons that do not stretch and carry nothing, H_c theta = -l_0 in their rows: (4).
-
-        Tendons that pull all of their joints one way are bands, which stretch.
-        """
-        return cls.from_routing(routing, np.zeros(routing.passive), np.ones(routing.passive), slack, bands=False)
+    def posture(self, angles: Array) -> Array:
+        """Return theta^d, shape (..., n), rad, from the angles of the free joints, shape (..., k)."""
+        posture: Array = angles @ self.matrix[:, self.free].T + self.offset
+        return posture
 
     @property
     def free(self) -> list[int]:

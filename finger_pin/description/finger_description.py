@@ -6,21 +6,14 @@ Every description is frozen and validated; nothing here computes physics.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Self
 
-from pydantic import (
-    Field,
-    PrivateAttr,
-    SerializerFunctionWrapHandler,
-    field_validator,
-    model_serializer,
-    model_validator,
-)
+from pydantic import Field, PrivateAttr, field_validator, model_serializer, model_validator
 
 from finger_pin.description.actuators import Actuator, check_actuators
 from finger_pin.description.caching import memoised
-from finger_pin.description.cords import Cord, check_tendons
+from finger_pin.description.cords import Cord, DriveCord, check_tendons, drive_cords
 from finger_pin.description.effects import OF_FINGER, OF_HAND, refuse_idle
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
 from finger_pin.description.links import placed_on_palm, tree_of_links
@@ -67,8 +60,8 @@ class FingerDescription(Description):
     tree: Tree = Field(NO_TREE, description="Bodies in place of links, with joints, tendons and actuators.")
 
     @model_serializer(mode="wrap")
-    def _written(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        written: dict[str, Any] = write(self)
+    def _written(self, write: Callable[[Self], dict[str, Any]]) -> dict[str, Any]:
+        written = write(self)
         if not self.tree.bodies:
             written.pop("tree", None)
         return written
@@ -95,9 +88,10 @@ class FingerDescription(Description):
         check_actuators(self.actuators, self.actuated_names, self.passive_names)
         for key, actuator in self.actuators.items():
             for name in actuator.tendons:
-                if self.tendons[name].maximum_tension is not None:
-                    allowed = f"is for ideal sources: actuators.{key} pulls it"
-                    raise problem(f"tendons.{name}.maximum_tension", allowed, self.tendons[name].maximum_tension)
+                for entry in ("maximum_tension", "winch"):
+                    if (value := getattr(self.tendons[name], entry)) is not None:
+                        allowed = f"is for tendons without a motor: actuators.{key} pulls it"
+                        raise problem(f"tendons.{name}.{entry}", allowed, value if isinstance(value, float) else None)
         self._expand()
         refuse_idle(self, OF_FINGER)
         return self
@@ -148,6 +142,11 @@ class FingerDescription(Description):
         if tendon.along is not None:
             return self.tree.cord(tendon.along, curvature_offset=tendon.curvature_offset, at_bends=at_bends)
         return Cord.of_crossings(tendon, at_bends=at_bends)
+
+    @property
+    def drive_cords(self) -> dict[str, DriveCord]:
+        """The cords by which winches and spools of motors pull tendons, by tendon."""
+        return drive_cords(self.tendons, self.actuators)
 
     @property
     def through_space(self) -> bool:

@@ -292,8 +292,8 @@ class Scenario(Description):
         ]
         # In open loop nothing follows a reference.
         needed = self.controller.kind != "tensions"
-        numbers = self.finger.numbers["passive_tendon"]["stiffness"], slack_lengths(self.finger)
-        return PassiveCoupling.from_routing(routing, np.concatenate(wishes), *numbers, needed=needed)
+        stretch = np.concatenate(wishes) / self.finger.numbers["passive_tendon"]["stiffness"]
+        return PassiveCoupling.from_routing(routing, slack_lengths(self.finger) + stretch, needed=needed)
 
     def sample_times(self) -> Array:
         """Return the times of the saved signals, s: multiples of the sampling period, and the end."""

@@ -48,14 +48,11 @@ class Tautness:
         joints = list(finger.joints.values())
         stiffness = np.array([joint.spring.stiffness if joint.spring else 0.0 for joint in joints])
         rest = np.array([joint.spring.rest if joint.spring else 0.0 for joint in joints])
-        free = coupling.free
         tendons = len(minimum)
         scale = np.max(np.abs(routing.coupling))
         worst = (np.inf, np.zeros(len(joints)))
-        for corner in product(*(joints[index].range for index in free)):
-            base = np.zeros(len(joints))
-            base[free] = corner
-            posture = coupling.matrix @ base + coupling.offset
+        for corner in product(*(joints[index].range for index in coupling.free)):
+            posture = coupling.posture(np.array(corner))
             torque = stiffness * (posture - rest) - routing.coupling.T @ minimum
             programme = linprog(
                 np.append(np.zeros(tendons), -1.0),

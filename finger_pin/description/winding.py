@@ -77,10 +77,6 @@ def check_winding(
                 raise problem(entry, f"has two sources: {wound[motor]} turns the same spool; leave one out")
             wound[motor] = entry
     winched = [name for name, tendon in finger.tendons.items() if tendon.winch is not None]
-    for name in winched:
-        if name in winder:
-            allowed = f"is for tendons without a motor: finger.actuators.{winder[name]} pulls it"
-            raise problem(f"finger.tendons.{name}.winch", allowed)
     if winched and kind == "proportional":
         allowed = f'must be "tensions": ideal winches wind {", ".join(winched)} in open loop'
         raise problem("controller.kind", allowed, kind)

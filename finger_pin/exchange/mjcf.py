@@ -141,8 +141,7 @@ def _header(description: FingerDescription, tendons: Tendons, massless: bool, fr
     notes["held"] = _HYSTERESIS_LEFT_OUT if any(springs) or tendons.hysteresis.any() else ""
     notes["stops"] = _SOFT_STOPS if limits else _NO_STOPS
     notes["contacts"] = ";\n  - ".join(CONTACTS_LEFT_OUT)
-    wound = bool(description.actuators) or any(tendon.winch for tendon in description.tendons.values())
-    notes["servos"] = _SERVOS_LEFT_OUT if wound else ""
+    notes["servos"] = _SERVOS_LEFT_OUT if description.drive_cords else ""
     if tendons.routing.passive:
         notes["passive"] = _WITHOUT_MASS if massless else _WITH_MASS
     return _HEADER.format(**notes).replace("--", "- -")

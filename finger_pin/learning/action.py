@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from finger_pin.control.input_ranges import input_ranges, spool_ranges
 from finger_pin.description.coupling import PassiveCoupling
@@ -58,8 +58,8 @@ class Action:
                 raise InputError("action", f'"{kind}" needs motors in position drive{winches} at all tendons')
             radius = finger.actuators.radius
             if kind == "joint_position":
-                free = np.delete(np.arange(len(finger.routing.joints)), coupling.followers)
-                limiter, to_goals = nominal.stroke_limiter, partial(_spool_angles, nominal, coupling, free)
+                limiter, free = nominal.stroke_limiter, coupling.free
+                to_goals = partial(_spool_angles, nominal, coupling)
                 self.low, self.high = limiter.lower[free], limiter.upper[free]
                 self.names = tuple(finger.routing.joints[k] for k in free)
             else:
@@ -121,10 +121,8 @@ def _divide(scale: Array, action: Array) -> Array:
     return np.asarray(action / scale)
 
 
-def _spool_angles(finger: Finger, coupling: PassiveCoupling, free_joints: NDArray[np.int64], goal: Array) -> Array:
+def _spool_angles(finger: Finger, coupling: PassiveCoupling, goal: Array) -> Array:
     """Return the spool angles that goals of the free joints need, shape (m,), rad, with all tendons taut in balance."""
-    free_position = np.zeros(len(finger.routing.joints))
-    free_position[free_joints] = goal
-    position, closure = coupling.matrix @ free_position + coupling.offset, finger.routing.force_closure()
+    position, closure = coupling.posture(goal), finger.routing.force_closure()
     tension = _CLOSING_TENSION * closure.tension[: finger.routing.actuated]
     return finger.actuators.angle(position, tension, finger.excursion(position))

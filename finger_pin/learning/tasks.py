@@ -47,7 +47,7 @@ def fingertip_goal(random: np.random.Generator) -> dict[str, Array]:
     limiter, coupling = finger.stroke_limiter, _scenario("reversals").coupling(finger.routing)
     margin = 0.1 * (limiter.upper - limiter.lower)
     free = random.uniform(limiter.lower + margin, limiter.upper - margin)
-    return {"goal": finger.rigid_body.tip_position(coupling.matrix @ free + coupling.offset)}
+    return {"goal": finger.rigid_body.tip_position(coupling.posture(free[coupling.free]))}
 
 
 def wanted_force(random: np.random.Generator) -> dict[str, Array]:

@@ -149,7 +149,7 @@ class World:
             else:
                 limiter, coupling = finger.stroke_limiter, simulator.scenario.coupling(finger.routing)
                 free_position = self._random.uniform(limiter.lower, limiter.upper)
-                position = np.clip(coupling.matrix @ free_position + coupling.offset, limiter.lower, limiter.upper)
+                position = np.clip(coupling.posture(free_position[coupling.free]), limiter.lower, limiter.upper)
             if self._starts_at(position):
                 return
         # The nearest free posture on the way to the reference: a training must not end here.

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.routing import Routing
-from finger_pin.description.validation import expand
 from finger_pin.laws.cogging import COGGING
 from finger_pin.laws.gearbox import GEARBOX
 from finger_pin.laws.limiter import STROKE_LIMITER
@@ -79,14 +78,9 @@ class Actuators:
     @classmethod
     def from_description(cls, description: FingerDescription, routing: Routing) -> Actuators:
         """Read motors and the tendons that they pull."""
-        actuators, names = description.actuators.values(), list(description.actuators)
+        actuators, names, held = description.actuators.values(), list(description.actuators), description.drive_cords
         strands = [(name, tendon) for name, each in description.actuators.items() for tendon in each.tendons]
-
-        def of_tendons(field: str) -> Array:
-            values = [expand(getattr(each, field), len(each.tendons)) for each in actuators]
-            return np.concatenate([np.zeros(0), *values])
-
-        stiffness = of_tendons("tendon_rigidity") / of_tendons("tendon_length")
+        cords = [held[tendon] for _, tendon in strands]
         spools = np.zeros((len(strands), len(names)))
         for row, (name, tendon) in enumerate(strands):
             actuator = description.actuators[name]
@@ -116,10 +110,10 @@ class Actuators:
             names=tuple(names),
             tendons=np.array([routing.tendons.index(tendon) for _, tendon in strands], dtype=np.int64),
             spools=spools,
-            stiffness=stiffness,
-            damping=of_tendons("tendon_damping"),
-            hysteresis=of_tendons("tendon_hysteresis"),
-            slack=of_tendons("pretension") / stiffness,
+            stiffness=np.array([cord.stiffness for cord in cords]),
+            damping=np.array([cord.damping for cord in cords]),
+            hysteresis=np.array([cord.hysteresis for cord in cords]),
+            slack=np.array([cord.slack for cord in cords]),
             inertia=np.array([each.motor.inertia for each in actuators]),
             holds=np.array([each.drive == "position" for each in actuators], dtype=bool),
             motor=np.array(motors).reshape(-1, len(MOTOR.parameters)).T,

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from finger_pin.description.cords import DriveCord
 from finger_pin.description.finger_description import FingerDescription
-from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
 from finger_pin.laws.capstan import PASSIVE_FRICTION
 from finger_pin.laws.sheath import SHEATH_PIECE, SHEATH_PLACE, SHEATH_SLIP, SPOOL_ENTRANCE, WOUND_ENTRANCE
@@ -25,17 +25,9 @@ from finger_pin.typing import Array
 SHEATHS = "tendon_sheaths"
 #: What winches supply.
 WINCH_ENERGY = Energy("winches", "winches, through their cords")
-_ELASTIC_TENDONS, _PIECES, _SLIPS = "elastic_tendons", "sheath_pieces", "sheath_slips"
+_PIECES, _SLIPS = "sheath_pieces", "sheath_slips"
 # Least viscous coefficient over the cord's stiffness, s: waves of sliding settle within a few times this.
 _RELAXATION = 1e-4
-
-
-def piece_numbers(description: FingerDescription) -> dict[str, int]:
-    """Return the numbers of pieces of the cords that stretch within their sheaths, by tendon."""
-    numbers = {name: each.winch.pieces for name, each in description.tendons.items() if each.winch}
-    for each in description.actuators.values():
-        numbers |= dict(zip(each.tendons, map(int, expand(each.tendon_pieces, len(each.tendons))), strict=True))
-    return {name: number for name, number in numbers.items() if number}
 
 
 def rubbing_shares(number: int) -> Array:
@@ -51,18 +43,16 @@ class _Cord(NamedTuple):
         table: The table that pulls it.
         row: Its row there.
         name: Of the tendon.
+        whole: Its stiffness, damping and slack.
         shares: Parts of the sheath that rub at its places, shape (n,).
-        stiffness: K, N/m.
-        damping: D, N s/m.
         first: Index of its first place among those of all cords.
     """
 
     table: Rows
     row: int
     name: str
+    whole: DriveCord
     shares: Array
-    stiffness: float
-    damping: float
     first: int
 
     @property
@@ -85,15 +75,12 @@ def in_sheaths(
     Raises:
         InputError: If a sheathed cord has a stiction ratio above 1: where it slips there would be no one speed.
     """
-    numbers, cords, first = piece_numbers(description), list[_Cord](), 0
+    wound, cords, first = description.drive_cords, list[_Cord](), 0
     for table in drives:
-        winch = table.group == WINCHES
-        for row, name in enumerate(table.pulls if winch or table.group == _ELASTIC_TENDONS else ()):
-            if number := numbers.get(name, 0):
-                keys = ("gain", "by_speed") if winch else ("stiffness", "damping")
-                stiffness, damping = (abs(float(table[key][row])) for key in keys)
-                cords.append(_Cord(table, row, name, rubbing_shares(number), stiffness, damping, first))
-                first += number
+        for row, name in enumerate(table.pulls):
+            if name in wound and (count := wound[name].pieces):
+                cords.append(_Cord(table, row, name, wound[name], rubbing_shares(count), first))
+                first += count
     if not cords:
         return [*drives], []
     columns = [[*description.tendons].index(cord.name) for cord in cords]
@@ -102,23 +89,24 @@ def in_sheaths(
         if ratio != 1.0:
             allowed = f"must be 1 where a cord stretches within its sheath, as {cord.name} does by its pieces"
             raise InputError("finger.tendon_friction.stiction_ratio", allowed, ratio)
-    entered = [_entrances(table, [cord for cord in cords if cord.table is table], first) for table in drives]
+    entered = [_entrances(table, wound, [cord for cord in cords if cord.table is table], first) for table in drives]
     places = _places(description, entered, cords, rubbing)
     return entered, [places, _slips(places, cords), _pieces(places, cords)]
 
 
-def _entrances(table: Rows, cords: Sequence[_Cord], places: int) -> Rows:
+def _entrances(table: Rows, wound: Mapping[str, DriveCord], cords: Sequence[_Cord], places: int) -> Rows:
     """Return a table of drives in which some cords end at their first places."""
     if not cords:
         return table
     winch, reading = table.group == WINCHES, np.zeros((table.count, places))
-    stiffness, damping = (table["gain"], -table["by_speed"]) if winch else (table["stiffness"], table["damping"])
+    stiffness, damping = np.array([[wound[name].stiffness, wound[name].damping] for name in table.pulls]).T
     most, offset = table["most"] if winch else np.full(table.count, np.inf), table.offset.copy()
-    stiffness, damping = stiffness.copy(), damping.copy()
     for cord in cords:
         part = cord.compliances[0]
         # What pretension stretches is shared by all pieces; places have the damping.
-        stiffness[cord.row], offset[cord.row], damping[cord.row] = cord.stiffness / part, part * offset[cord.row], 0.0
+        stiffness[cord.row] /= part
+        offset[cord.row] *= part
+        damping[cord.row] = 0.0
         reading[cord.row, cord.first] = -1.0 / part
     law, parameters = WOUND_ENTRANCE if winch else SPOOL_ENTRANCE, np.array([stiffness, damping, most])
     return replace(table, law=law, parameters=parameters, offset=offset, readings={_SLIPS: reading})
@@ -132,15 +120,15 @@ def _places(
     before = {_PIECES: np.zeros((count, count))} | {each.group: np.zeros((count, each.count)) for each in drives}
     arm, turns, parameters = np.zeros((count, drives[0].arm.shape[1])), np.zeros(count), list[Array]()
     for k, cord in enumerate(cords):
-        whole = description.cord(cord.name)
+        path = description.cord(cord.name)
         own = np.arange(cord.first, cord.first + len(cord.shares))
         before[cord.table.group][own[0], cord.row] = before[_PIECES][own[1:], own[:-1]] = 1.0
-        arm[own, : len(description.joints)] = whole.arms(list(description.joints))
-        turns[own] = cord.shares * whole.curvature_offset
+        arm[own, : len(description.joints)] = path.arms(list(description.joints))
+        turns[own] = cord.shares * path.curvature_offset
         # The sheath is one of the places that share what has no load.
-        viscous, drag = (rubbing[key][k] / (1 + len(whole.wraps)) for key in ("viscous", "drag"))
-        viscous = max(cord.damping + viscous, _RELAXATION * cord.stiffness)
-        beside = cord.stiffness * (1.0 / cord.compliances[:-1] + 1.0 / cord.compliances[1:])
+        viscous, drag = (rubbing[key][k] / (1 + len(path.wraps)) for key in ("viscous", "drag"))
+        viscous = max(cord.whole.damping + viscous, _RELAXATION * cord.whole.stiffness)
+        beside = cord.whole.stiffness * (1.0 / cord.compliances[:-1] + 1.0 / cord.compliances[1:])
         # Places move as fast as they can without ringing.
         mass, wound = 0.25 * (viscous * cord.shares) ** 2 / beside, float(cord.table.group == WINCHES)
         values = rubbing["surface"][k], mass, viscous * cord.shares, drag * cord.shares, wound
@@ -163,7 +151,7 @@ def _places(
 
 def _slips(places: Rows, cords: Sequence[_Cord]) -> Rows:
     """Return the table of how far places are drawn in."""
-    stiffness = np.concatenate([np.full(len(cord.shares), cord.stiffness) for cord in cords])
+    stiffness = np.concatenate([np.full(len(cord.shares), cord.whole.stiffness) for cord in cords])
     reading = {SHEATHS: np.eye(places.count)}
     return replace(
         places,
@@ -186,8 +174,7 @@ def _pieces(places: Rows, cords: Sequence[_Cord]) -> Rows:
         own, parts = np.arange(cord.first, cord.first + len(cord.shares)), cord.compliances[1:]
         reading[own, own], reading[own[:-1], own[1:]] = 1.0 / parts, -1.0 / parts[:-1]
         if cord.table.group != WINCHES:
-            compliance[own] = parts / cord.stiffness
-            pretension[own] = -cord.stiffness * cord.table.offset[cord.row]
+            compliance[own], pretension[own] = parts / cord.whole.stiffness, cord.whole.stiffness * cord.whole.slack
     return Rows(
         _PIECES,
         SHEATH_PIECE,

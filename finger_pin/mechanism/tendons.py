@@ -20,7 +20,7 @@ from finger_pin.laws.spring import TENDON_HALF
 from finger_pin.mechanism.groups import SOURCES, SOURCES_WITH_END, TENDON_LOSSES, WINCHES
 from finger_pin.mechanism.joints import OF_TENDONS, hysteresis_rows
 from finger_pin.mechanism.rows import Energy, Rows
-from finger_pin.mechanism.sheaths import WINCH_ENERGY, piece_numbers
+from finger_pin.mechanism.sheaths import WINCH_ENERGY
 from finger_pin.mechanism.wiring import drive_matrices
 from finger_pin.typing import Array, Number
 
@@ -51,8 +51,9 @@ class Tendons:
     def wraps(self) -> tuple[tuple[Cord, ...], ...]:
         """The places where each of its tendons, and of those of its tree, rubs, behind sheaths with pieces."""
         cords, places = {**self.routing.cords}, list[tuple[Cord, ...]]()
-        for name in piece_numbers(self.description):
-            cords[name] = cords[name]._replace(curvature_offset=0.0)
+        for name, wound in self.description.drive_cords.items():
+            if wound.pieces:
+                cords[name] = cords[name]._replace(curvature_offset=0.0)
         for cord, whole in zip(cords.values(), self.routing.cords.values(), strict=True):
             # The sheath is one more of them.
             count = len(cord.wraps) + (cord is not whole)
@@ -187,13 +188,13 @@ class Tendons:
 
     def sources(self, width: int) -> list[Rows]:
         """Return the tables of ideal sources whose tension has an end, and of ideal winches, none without any."""
-        plain, winches = {}, {}
-        for k, tendon in enumerate(self.description.tendons.values()):
+        plain, winches, cords = {}, {}, self.description.drive_cords
+        for k, (name, tendon) in enumerate(self.description.tendons.items()):
             most = tendon.maximum_tension
             if tendon.winch is not None:
                 # T = max(0, K (w - l) - D l'), as a position actuator of MuJoCo that only pulls.
-                stiff, end = tendon.winch.stiffness, np.inf if most is None else most
-                winches[k] = [stiff, 0.0, -stiff, -tendon.winch.damping, -np.inf, np.inf, 0.0, end]
+                stiff, end = cords[name].stiffness, np.inf if most is None else most
+                winches[k] = [stiff, 0.0, -stiff, -cords[name].damping, -np.inf, np.inf, 0.0, end]
             elif most is not None:
                 plain[k] = [1.0, 0.0, 0.0, 0.0, 0.0, most, 0.0, most]
         tables = []

@@ -94,8 +94,7 @@ class SignalReference:
     def at(self, time: Array | float) -> ReferenceSignals:
         """Return theta^d and its rate at one time, or at times of shape (m,)."""
         position, rate = self.signal.at(time)
-        matrix = self.coupling.matrix.T
-        return ReferenceSignals(position @ matrix + self.coupling.offset, rate @ matrix)
+        return ReferenceSignals(self.coupling.posture(position[..., self.coupling.free]), rate @ self.coupling.matrix.T)
 
     def signals(self) -> tuple[Signal, ...]:
         """Return the functions of time in it."""

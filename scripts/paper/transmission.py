@@ -121,13 +121,10 @@ def workspace_postures(finger: FingerLike, samples: int = 9) -> Array:
         samples: Angles per free joint.
     """
     finger = as_finger(finger)
-    limiter, coupling = finger.stroke_limiter, PassiveCoupling.inextensible(finger.routing)
-    low, high = limiter.lower, limiter.upper
-    axes = [
-        [0.0] if index in coupling.followers else np.linspace(a, b, samples)
-        for index, (a, b) in enumerate(zip(low, high, strict=True))
-    ]
-    postures = np.array(list(product(*axes))) @ coupling.matrix.T
+    low, high = finger.stroke_limiter.lower, finger.stroke_limiter.upper
+    coupling = PassiveCoupling.from_routing(finger.routing, finger.tendons.slack, bands=False)
+    axes = [np.linspace(low[joint], high[joint], samples) for joint in coupling.free]
+    postures = coupling.posture(np.array(list(product(*axes))))
     inside = np.all((postures >= low - 1e-9) & (postures <= high + 1e-9), axis=1)
     return np.asarray(postures[inside])
 
@@ -143,13 +140,13 @@ def flexion_postures(finger: FingerLike, samples: int = 41) -> Array:
         samples: Angles per joint.
     """
     finger = as_finger(finger)
-    limiter, coupling = finger.stroke_limiter, PassiveCoupling.inextensible(finger.routing)
-    low, high = limiter.lower, limiter.upper
+    low, high = finger.stroke_limiter.lower, finger.stroke_limiter.upper
+    coupling = PassiveCoupling.from_routing(finger.routing, finger.tendons.slack, bands=False)
     postures = np.tile(np.clip(np.zeros(len(low)), low, high), (samples, samples, 1))
     for axis, joint in enumerate(coupling.free[-2:]):
         angles = np.linspace(low[joint], high[joint], samples)
         postures[..., joint] = angles[:, None] if axis == 0 else angles
-    return np.asarray(postures @ coupling.matrix.T)
+    return coupling.posture(postures[..., coupling.free])
 
 
 def transmission_in_motion(finger: FingerLike, result: xr.Dataset) -> TransmissionInMotion:

@@ -79,7 +79,7 @@ def _matrix(finger: Finger, coupled: bool) -> Array:
 
 
 def _constraint(finger: Finger) -> PassiveCoupling:
-    return PassiveCoupling.inextensible(finger.routing)
+    return PassiveCoupling.from_routing(finger.routing, finger.tendons.slack, bands=False)
 
 
 def _rest(finger: Finger) -> Array:

@@ -145,4 +145,4 @@ def _followers(finger: fp.FingerDescription) -> tuple[int, ...]:
     from finger_pin.description.routing import Routing
 
     routing = Routing.from_description(finger)
-    return tuple(PassiveCoupling.from_routing(routing, np.ones(routing.passive), np.ones(routing.passive)).followers)
+    return tuple(PassiveCoupling.from_routing(routing, np.zeros(routing.passive)).followers)

@@ -76,6 +76,23 @@ def test_a_wrong_actuator_is_an_error_of_one_line_that_names_the_entry(case):
     assert "\n" not in message
 
 
+def test_a_finger_alone_refuses_a_winch_and_an_end_of_tension_beside_a_motor():
+    for entry, value in (("winch", {"pieces": 2}), ("maximum_tension", 30.0)):
+        with pytest.raises(InputError, match=rf"^finger\.tendons\.T1\.{entry}.*actuators\.M pulls it"):
+            load_finger("ub_stand_in", {"finger.actuators": {"M": SPOOL}, f"finger.tendons.T1.{entry}": value})
+
+
+def test_winches_and_spools_of_the_same_numbers_have_the_same_cords():
+    """K = E A / L_0 = 4500 N / 0.3 m, and e0 = T_0 / K."""
+    winch = {"stiffness": 15000.0, "damping": 7.0, "pieces": 3}
+    spool = {"tendons": ["T1", "T2"], "winds": ["in", "in"], "drive": "position", "tendon_rigidity": [4500.0, 9000.0]}
+    spool |= {"tendon_damping": 7.0, "tendon_pieces": [3, 0], "tendon_hysteresis": [0.0, 0.1], "pretension": [0.0, 3.0]}
+    tables = {"finger.actuators": {"M": SPOOL | spool}, "finger.tendons.T3.winch": winch}
+    cords = load_finger("ub_stand_in", tables).drive_cords
+    assert list(cords) == ["T3", "T1", "T2"] and cords["T1"] == cords["T3"] == (15000.0, 7.0, 3, 0.0, 0.0)
+    assert cords["T2"] == pytest.approx((30000.0, 7.0, 0, 0.1, 1e-4), rel=1e-14)
+
+
 def test_a_motor_that_starts_from_itself_is_named(tmp_path):
     (tmp_path / "one.toml").write_text('base = "other.toml"\n')
     (tmp_path / "other.toml").write_text('base = "one.toml"\n')

@@ -26,9 +26,7 @@ def described(network):
 
 def tautness(description, minimum, coupling=None):
     routing = Routing.from_description(description)
-    coupling = coupling or PassiveCoupling.from_routing(
-        routing, np.ones(routing.passive), np.full(routing.passive, 1e4)
-    )
+    coupling = coupling or PassiveCoupling.from_routing(routing, np.full(routing.passive, 1e-4))
     return Tautness.from_finger(description, routing, coupling, np.broadcast_to(minimum, len(routing.tendons)))
 
 

@@ -82,9 +82,7 @@ def test_followers_may_follow_followers_whichever_is_written_first(network, orde
     passive = {"P": {"a": -3, "b": 4}, "Q": {"b": -2, "c": 3}}
     routing = Routing.from_description(network("abc", tendons | {name: passive[name] for name in order}, order))
     wanted, stiffness = {"P": 2.0, "Q": 3.0}, {"P": 1e4, "Q": 4e4}
-    coupling = PassiveCoupling.from_routing(
-        routing, np.array([wanted[n] for n in order]), np.array([stiffness[n] for n in order])
-    )
+    coupling = PassiveCoupling.from_routing(routing, np.array([wanted[n] / stiffness[n] for n in order]))
     assert sorted(coupling.followers) == [1, 2]
     reference = sinusoids(coupling, 3)
     a, b, c = reference.at(0.7).position
@@ -98,23 +96,35 @@ def test_followers_may_follow_followers_whichever_is_written_first(network, orde
     assert vc == pytest.approx(0.5 * va, rel=1e-12)
 
 
+def test_a_posture_satisfies_the_constraint_for_any_angles_of_the_free_joints(network):
+    """H_c theta = -length in the rows of the passive tendons, of which the second one follows the first."""
+    tendons = {"F": {"a": 6}, "E": {"a": -5, "b": -5, "c": -5}, "P": {"a": -3, "b": 4}, "Q": {"b": -2, "c": 3}}
+    routing = Routing.from_description(network("abc", tendons, ["P", "Q"]))
+    length = np.array([2e-4, -1e-3])
+    coupling = PassiveCoupling.from_routing(routing, length)
+    angles = np.linspace(-1.0, 1.0, 6).reshape(2, 3, 1)
+    postures = coupling.posture(angles)
+    np.testing.assert_array_equal(postures[..., coupling.free], angles)
+    np.testing.assert_allclose(postures @ routing.coupling[routing.actuated :].T, -length + 0.0 * angles, atol=1e-17)
+
+
 def test_a_tendon_over_three_joints_drives_the_last_one(network):
     tendons = {"F": {"a": 6}, "E": {"a": -5, "b": -5, "c": -5}, "P": {"a": -3, "b": -2, "c": 4}}
     routing = Routing.from_description(network("abc", tendons, ["P"]))
-    coupling = PassiveCoupling.from_routing(routing, np.array([2.0]), np.array([1e4]))
+    coupling = PassiveCoupling.from_routing(routing, np.array([2.0 / 1e4]))
     assert coupling.followers == (2,)
     a, b, c = sinusoids(coupling, 3).at(1.3).position
     assert c == pytest.approx((3e-3 * a + 2e-3 * b - 2.0 / 1e4) / 4e-3, rel=1e-12)
-    loose = PassiveCoupling.from_routing(routing, np.array([2.0]), np.array([1e4]), np.array([1e-3]))
+    loose = PassiveCoupling.from_routing(routing, np.array([2.0 / 1e4 + 1e-3]))
     a, b, c = sinusoids(loose, 3).at(1.3).position
     assert c == pytest.approx((3e-3 * a + 2e-3 * b - 2.0 / 1e4 - 1e-3) / 4e-3, rel=1e-12)
 
 
 def test_a_spring_to_the_base_and_no_passive_tendon_leave_every_joint_its_own_reference(network):
     spring = Routing.from_description(network("a", {"F": {"a": 6}, "P": {"a": -3}}, ["P"]))
-    assert PassiveCoupling.from_routing(spring, np.ones(1), np.ones(1)).followers == ()
+    assert PassiveCoupling.from_routing(spring, np.ones(1)).followers == ()
     none = Routing.from_description(fp.load_finger("planar"))
-    coupling = PassiveCoupling.from_routing(none, np.zeros(0), np.zeros(0))
+    coupling = PassiveCoupling.from_routing(none, np.zeros(0))
     np.testing.assert_array_equal(coupling.matrix, np.eye(2))
     np.testing.assert_array_equal(coupling.offset, np.zeros(2))
 
@@ -123,7 +133,7 @@ def test_two_passive_tendons_on_one_follower_are_refused_by_name(network):
     tendons = {"F": {"a": 6}, "E": {"a": -5, "b": -5}, "P": {"a": -3, "b": 4}, "Q": {"a": -2, "b": 3}}
     routing = Routing.from_description(network("ab", tendons, ["P", "Q"]))
     with pytest.raises(InputError, match="P, Q determine the same joint twice") as caught:
-        PassiveCoupling.from_routing(routing, np.ones(2), np.ones(2))
+        PassiveCoupling.from_routing(routing, np.ones(2))
     assert caught.value.entry == "finger.tendons"
 
 

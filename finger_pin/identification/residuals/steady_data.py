@@ -12,7 +12,6 @@ from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.loading import read_scenario
 from finger_pin.description.parameters import Winch
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import expand
 from finger_pin.exceptions import InputError
 from finger_pin.identification.parameters.keys import corrections
 from finger_pin.identification.parameters.parameters import ScenarioMap
@@ -255,13 +254,13 @@ def _resting_finger(finger: FingerDescription, wound_tendons: Collection[str]) -
         finger: Whose motors wind one cord each where they are given goals.
         wound_tendons: Names of the tendons that these pull; of all others the tension is known.
     """
-    tendons = dict(finger.tendons)
-    for key, actuator in finger.actuators.items():
+    tendons, cords = dict(finger.tendons), finger.drive_cords
+    for actuator in finger.actuators.values():
         tendon, motor, radius = actuator.tendons[0], actuator.motor, float(actuator.radii[0])
         constant, resistance, _ = motor.constants
         maximum_tension = constant * min(motor.voltage / resistance, motor.maximum_current) / radius
         if tendon in wound_tendons:
-            stiffness, loop = _cord_properties(finger, key)[0], actuator.position_loop
+            stiffness, loop = cords[tendon].stiffness, actuator.position_loop
             torque_per_error = constant * motor.voltage / resistance * loop.proportional
             if not loop.integral:
                 stiffness *= torque_per_error / (torque_per_error + stiffness * radius**2)
@@ -274,14 +273,6 @@ def _resting_finger(finger: FingerDescription, wound_tendons: Collection[str]) -
 
 def _wound_length(finger: FingerDescription, motor: str, goal: Array, is_angle: bool) -> Array:
     """Return the winding of the winch in place of a motor, m, for goals of its spool, rad, or of its cord, m."""
-    stiffness, pretension = _cord_properties(finger, motor)
-    return np.asarray((finger.actuators[motor].radii[0] if is_angle else 1.0) * goal + pretension / stiffness)
-
-
-def _cord_properties(finger: FingerDescription, motor: str) -> tuple[float, float]:
-    """Return the stiffness, N/m, and the pretension, N, of a motor's only cord."""
     actuator = finger.actuators[motor]
-    rigidity, length, pretension = (
-        float(expand(each, 1)[0]) for each in (actuator.tendon_rigidity, actuator.tendon_length, actuator.pretension)
-    )
-    return rigidity / length, pretension
+    slack = finger.drive_cords[actuator.tendons[0]].slack
+    return np.asarray((actuator.radii[0] if is_angle else 1.0) * goal + slack)

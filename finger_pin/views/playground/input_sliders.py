@@ -111,10 +111,9 @@ class Inputs:
 
     def _joint_sliders(self) -> tuple[Slider, ...]:
         finger, limiter = self._loop.finger, self._loop.finger.stroke_limiter
-        self._free = np.delete(np.arange(len(finger.routing.joints)), self._coupling.followers)
         return tuple(
             Slider(finger.routing.joints[k], "rad", float(limiter.lower[k]), float(limiter.upper[k]), True)
-            for k in self._free
+            for k in self._coupling.free
         )
 
     def choose(self, kind: str, position: Array) -> None:
@@ -132,9 +131,8 @@ class Inputs:
 
     def slider_values(self, kind: str, position: Array) -> Array:
         """Return the values of the sliders of a kind at the present posture, tensions and angles."""
-        values = (
-            position[self._free] if kind == JOINTS else np.concatenate([self._command[self._channels], self._goals])
-        )
+        tendons = np.concatenate([self._command[self._channels], self._goals])
+        values = position[self._coupling.free] if kind == JOINTS else tendons
         low, high = np.array([(slider.low, slider.high) for slider in self.sliders[kind]]).T
         return np.asarray(np.clip(values, low, high))
 
@@ -173,10 +171,8 @@ class Inputs:
         return command
 
     def _desired(self, rate: Array) -> ReferenceSignals:
-        position, velocity = np.zeros((2, len(self._loop.finger.routing.joints)))
-        position[self._free], velocity[self._free] = self._filtered, rate
-        matrix = self._coupling.matrix
-        return ReferenceSignals(matrix @ position + self._coupling.offset, matrix @ velocity)
+        coupling = self._coupling
+        return ReferenceSignals(coupling.posture(self._filtered), coupling.matrix[:, coupling.free] @ rate)
 
     def _damping_velocity(self, state: State, desired: Array) -> Array:
         """Return the velocity for the damping of a sampled controller, shape (n,), rad/s.
