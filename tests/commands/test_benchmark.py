@@ -133,9 +133,22 @@ def test_hanging_chains_without_friction_move_as_in_mujoco(load, links):
     growth, settled = load("benchmarks.growth"), load("benchmarks.runs").settled
     spent = []
     scenario = settled(growth.chain(links, 0.1, "none", amplitude=0.0), rtol=1e-9, atol_scale=1e-10)
-    path = growth.simulated(scenario, spent)()
+    path = load("benchmarks.equal_error").simulated(scenario, spent)()
     assert abs(path).max() > 4e-3 and spent[0][1] > 0
     np.testing.assert_allclose(path, growth.stepped(links, 0.1, 1e-4, "RK4")(), rtol=0.0, atol=1e-8)
+
+
+def test_mujoco_s_step_at_our_error_is_the_longest_halved_one_that_errs_no_more(load):
+    pytest.importorskip("mujoco")
+    equal = load("benchmarks.equal_error")
+    scenario = load("benchmarks.growth").chain(1, 0.3, "none", amplitude=0.0)
+    exact = equal.simulated(load("benchmarks.runs").settled(scenario, rtol=1e-9, atol_scale=1e-9), [])()
+    aim = equal.worst(equal.simulated(scenario, [])() - exact)
+    for share, step, relation in ((0.9, 2e-3 / 4, "="), (0.1, 2e-3, "<="), (1e6, 2e-3 / 2**8, ">=")):
+        # That share of our error at 0.5 ms, and in proportion to the step.
+        slope = share * aim / 5e-4
+        (row,) = equal.equal_error(scenario, lambda dt, _name, by=slope: lambda: exact + by * dt, ("none",))
+        assert (row["step"], row["relation"]) == (step, relation)
 
 
 def test_mujoco_s_own_loop_repeats_the_python_loop(load, brief):
@@ -169,9 +182,12 @@ def stages():
     spent = ("integration", "run", "simulate", *(f"short {each}" for each in ("steps", "run", "changed", "simulate")))
     runs = {"reversals": dict.fromkeys((*spent, "load"), 1e-3)}
     chain = {"links": 64, "friction": "none", "motion": 0.25, "whole": 0.2, "steps": 124, "step": 6e-4, "mujoco": 6e-5}
+    chain |= {"dataset": 2e6, "file": 1e6}
     equal = {"RK4": {"step": 1e-3, "time": 0.015, "relation": ">=", "over_whole": 0.75, "over_steps": 5.0}}
     precision = {"links": 8, "motion": 1.0, "aim": "rtol 0.0001", "equal": equal}
     precision |= {"points": [["rtol 0.0001", 1e-7, 0.02, 3e-3]]}
+    reached = {"name": "64 links", "friction": "none", "motion": 0.25, "error": 1e-6, "whole": 0.05, "inside": 0.02}
+    reached |= {"integrator": "RK4", "apart": 1e-9, "time": 0.1, "relation": ">=", "step": 1e-5, "finest": 2e-6}
     simulator = {"times": {"varied slowly": 7e-5}, "errors": {"varied slowly": 9e-4}}
     prepared = {"runs": runs, "simulator": simulator}
     job = {"options": [], "first": 31.0, "first_processor_time": 30.0, "first_memory": 2**20}
@@ -181,7 +197,7 @@ def stages():
         | {"real_time_factor_stepping": 40.0, "error": 1e-5, "worst": 1e-4},
         "joints": {"duration": 2.0, "rtol": 1e-5, "exponent": 1.5}
         | {"rows": [{"joints": n, "time_per_textbook_evaluation": 2e-4, **joint} for n in (1, 2, 3)]},
-        "growth": {"rows": [chain], "precision": precision},
+        "growth": {"rows": [chain], "precision": precision, "equal": [reached], "control": {"none": 0.003}},
         "hand": {"duration": 4.0, "joints": 20, "tendons": 25, "fingers": 5}
         | {
             "cores": {
