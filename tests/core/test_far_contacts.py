@@ -24,6 +24,14 @@ def balls():
     return {"table": plane(**HARD), **found, "thrown": thrown}
 
 
+def boxes():
+    """One that flies to another, without weight, and a third one far away."""
+    one = {"shape": "box", "sides": (0.04, 0.04, 0.02), "mass": 0.1, "surface": HARD}
+    places = {"flies": (0.0, 0.0, 0.0), "waits": (0.09, 0.01, 0.005), "apart": (0.5, 0.4, 0.0)}
+    found = {name: Object(position=place, **one) for name, place in places.items()}
+    return found | {"flies": found["flies"].updated(velocity=(0.6, 0.0, 0.0), angular_velocity=(0.0, 3.0, 1.0))}
+
+
 def stepper(mechanism, start, tolerance=1e-6):
     control = held_control(mechanism.channels, mechanism.coordinates)
     return Stepper(mechanism, control, start, TABLEAUS["Rodas5P"](), tolerance, np.full(mechanism.size, tolerance))
@@ -46,6 +54,43 @@ def test_contacts_that_sleep_change_not_one_bit_of_a_motion_in_which_they_wake_u
     # The capsule met what it slept beside.
     names = one.rows[0].names
     assert any(closed[3 * index] for index, name in enumerate(names) if "thrown" in name)
+
+
+def test_boxes_that_rest_as_pairs_wake_up_part_by_part_and_change_nothing():
+    (one, start), (other, _) = scene((0.0, 0.0, 0.0), **boxes()), scene((0.0, 0.0, 0.0), **boxes())
+    asleep, awake = stepper(one, start), stepper(other, start)
+    (sleeper,), (waker,) = asleep.parts, awake.parts
+    pairs = np.array(["-".join(sorted(name.split(".")[0].split("-"))) for name in one.rows[0].names])
+    rested, met, room = [], False, waker.room(1)
+    for k in range(1, 31):
+        assert asleep.advance(0.01 * k) == 0
+        while waker.time < 0.01 * k:
+            waker.forget()
+            waker.advance(0.01 * k, room)
+        # What is left of bristles of open contacts, below 1e-14 m, is cleared as they fall asleep.
+        np.testing.assert_allclose(asleep.x, awake.x, rtol=1e-9, atol=1e-12)
+        rested.append(sleeper.work.paths.resting.copy())
+        met |= bool(np.any(waker.work.rows[ROW.force][: 3 * len(pairs) : 3][pairs == "flies-waits"]))
+    # The two that met rested once, and the one that is left alone does in the end.
+    rests = dict(zip(dict.fromkeys(pairs), np.transpose(rested), strict=True))
+    assert met and rests["flies-waits"].any() and not rests["flies-waits"].all() and rests["apart-waits"][-1]
+
+
+def test_bodies_that_never_come_near_change_not_one_bit():
+    """An error that is averaged over states of contacts that are open lets steps be longer, the more there are."""
+    far = {
+        f"far_{k}": Object(shape="box", sides=(0.1, 0.1, 0.1), position=(5.0 + k, 0.0, 0.0), surface=HARD)
+        for k in range(4)
+    }
+    ends = []
+    for objects in (balls(), balls() | far):
+        mechanism, start = scene((0.0, 0.0, -G), **objects)
+        run = stepper(mechanism, start)
+        assert run.advance(0.3) == 0
+        width = 2 * mechanism.coordinates
+        ends.append((run.x[:width].copy(), sum(int(part.memory.accepted_steps[0]) for part in run.parts)))
+    np.testing.assert_array_equal(ends[0][0], ends[1][0])
+    assert ends[0][1] == ends[1][1]
 
 
 def test_each_block_that_contacts_join_is_condensed_to_the_solution_of_the_dense_system():

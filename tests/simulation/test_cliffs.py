@@ -111,14 +111,14 @@ def test_a_result_that_cannot_fit_into_memory_is_refused_by_its_sample_rate(monk
 
 
 def test_bodies_whose_contacts_cannot_fit_into_memory_are_refused_before_it_is_asked_for(monkeypatch):
-    """Of z states and more rows the linearisation has arrays of 8 bytes times their product."""
+    """Every part has three rows and two states, each with gains by positions, velocities and these states."""
     finger = fp.load_scenario("pinch")
     hand = fp.Hand(finger.finger, objects=finger.environment.objects)
-    pairs, size = len(hand.scene.contacts.names), hand.layout.size
-    least = 8 * 3 * pairs * (size - 2 * hand.mechanism.coordinates)
+    parts = len(hand.scene.contacts.names)
+    least = 8 * (3 + 2) * parts * (2 * hand.mechanism.coordinates + 2)
     pages = {"SC_PAGE_SIZE": 1, "SC_PHYS_PAGES": least}
     monkeypatch.setattr(os, "sysconf", pages.__getitem__)
-    with pytest.raises(fp.InputError, match=rf"^contacts: {pairs} pairs of bodies can touch, which needs .* GiB"):
+    with pytest.raises(fp.InputError, match=rf"^contacts: {parts} parts of bodies can touch, which needs .* GiB"):
         fp.Simulator(hand)
 
 

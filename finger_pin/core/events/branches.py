@@ -57,8 +57,13 @@ def freeze(address: int, _time: float) -> int:
                 for k in range(structure.groups.first[g], structure.groups.end[g]):
                     kinks[k] = rows[column, k]
                     rows[ROW.side, k] = np.sign(kinks[k])
+    integration.memory.counted[0] = integration.x.size
     if structure.contact_rows:
-        record_start_gaps(parameters, model.work.paths)
+        paths = model.work.paths
+        # Else a tolerance would mean less, the more bodies might touch.
+        open_contacts = structure.contact_rows // structure.contact_arms - paths.closed_count[0]
+        integration.memory.counted[0] -= open_contacts * (structure.contact_arms - 1)
+        record_start_gaps(parameters, paths)
     return 1
 
 

@@ -24,7 +24,7 @@ def _add_errors(
 
 @njit_inline
 def step_error(integration: Integration, end: Vector, difference: Vector) -> float:
-    """Return the error of a step as a multiple of the tolerance, root mean square over the state.
+    """Return the error of a step as a multiple of the tolerance, root mean square over the state that is counted.
 
     It is infinite where the end is not finite: an infinite scale would make any error small.
     """
@@ -34,7 +34,7 @@ def step_error(integration: Integration, end: Vector, difference: Vector) -> flo
     else:
         for part in range(parts):
             total = _add_errors(integration, end, difference, live[part, 0], live[part, 1], total)
-    return np.sqrt(total / size)
+    return np.sqrt(total / integration.memory.counted[0])
 
 
 @njit_always_inline

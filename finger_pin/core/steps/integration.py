@@ -48,6 +48,7 @@ class StepMemory(NamedTuple):
         retry_share: Share of it that is tried next, or 1.
         stale: Flag, whether the model has changed since the try, which is repeated from a new evaluation of its start.
         frozen: Flag, whether the branches of kinks are given instead of those where the step starts.
+        counted: Number of states over which errors are averaged: those of open contacts are none of the motion's.
     """
 
     time: Vector
@@ -75,6 +76,7 @@ class StepMemory(NamedTuple):
     retry_share: Vector
     stale: Vector
     frozen: Vector
+    counted: Vector
 
     @classmethod
     def from_vector(cls, values: Array) -> StepMemory:

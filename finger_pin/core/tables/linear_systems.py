@@ -174,8 +174,8 @@ def build_linear(structure: Structure, control: InputTable) -> Linear:
     own = (touching + slips) * (2 * width + structure.contact_arms - 1)
     needed = 8.0 * (full * (count + states - touching - slips + 2 * width) + own)
     if needed > (present := physical_memory()):
-        pairs, most = structure.contact_rows // structure.contact_arms, present / 2**30
-        allowed = f"{pairs} pairs of bodies can touch, which needs {needed / 2**30:.3g} GiB of memory, of {most:.3g}"
+        parts, most = structure.contact_rows // structure.contact_arms, present / 2**30
+        allowed = f"{parts} parts of bodies can touch, which needs {needed / 2**30:.3g} GiB of memory, of {most:.3g}"
         raise InputError("contacts", f"{allowed}; let fewer bodies touch")
     return Linear(
         mass=np.zeros((width, width)),
