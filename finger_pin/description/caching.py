@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import lru_cache, wraps
 from typing import Any, Generic, ParamSpec, Self, TypeVar, overload
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ConfigDict
 
 _Made = TypeVar("_Made")
 _P = ParamSpec("_P")
@@ -79,3 +79,21 @@ class cached_property(Generic[_Made]):
             return self
         value: _Made = vars(instance).setdefault(self._name, self._function(instance))
         return value
+
+
+class Frozen(BaseModel):
+    """Model whose entries stay. What cached properties have computed is neither copied nor pickled."""
+
+    model_config = ConfigDict(frozen=True, ignored_types=(cached_property,))
+
+    def __copy__(self) -> Self:
+        """Return a copy of the entries."""
+        copy = super().__copy__()
+        for name in vars(copy).keys() - type(self).model_fields.keys():
+            del vars(copy)[name]
+        return copy
+
+    def __getstate__(self) -> dict[Any, Any]:
+        """Return the entries."""
+        state, entries = super().__getstate__(), type(self).model_fields
+        return state | {"__dict__": {name: value for name, value in vars(self).items() if name in entries}}

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, PrivateAttr, field_validator, model_serializer, model_validator
 
 from finger_pin.description.actuators import Actuator, check_actuators
-from finger_pin.description.caching import memoised
+from finger_pin.description.caching import cached_property, memoised
 from finger_pin.description.cords import Cord, DriveCord, check_tendons, drive_cords
 from finger_pin.description.effects import OF_FINGER, OF_HAND, refuse_idle
 from finger_pin.description.friction import JointFrictionSettings, TendonFrictionSettings
@@ -56,7 +56,6 @@ class FingerDescription(Description):
         description="Whether links that are not neighbours touch each other, where there are contacts.",
     )
     _hand: HandSettings | None = PrivateAttr(None)
-    _numbers: PerItem = PrivateAttr(default_factory=PerItem)
     tree: Tree = Field(NO_TREE, description="Bodies in place of links, with joints, tendons and actuators.")
 
     @model_serializer(mode="wrap")
@@ -92,12 +91,17 @@ class FingerDescription(Description):
                     if (value := getattr(self.tendons[name], entry)) is not None:
                         allowed = f"is for tendons without a motor: actuators.{key} pulls it"
                         raise problem(f"tendons.{name}.{entry}", allowed, value if isinstance(value, float) else None)
-        self._expand()
+        _ = self.numbers
         refuse_idle(self, OF_FINGER)
         return self
 
-    def _expand(self) -> PerItem:
-        """Refuse lists of another length than their joints or tendons, and expand one number for all."""
+    @cached_property
+    def numbers(self) -> Mapping[str, Mapping[str, Array]]:
+        """Numbers of friction, passive tendons and stops as arrays of one per item, by table and entry.
+
+        Lists of another length than their joints or tendons are refused.
+        """
+        numbers = PerItem()
         for group, names, kind in (
             ("tendon_friction", (*self.tendons, *self.canals), "tendon"),
             ("joint_friction", tuple(self.joints), "joint"),
@@ -105,22 +109,12 @@ class FingerDescription(Description):
             ("stroke_limiter", tuple(self.joints), "joint"),
         ):
             for field, value in getattr(self, group):
-                check_size(value, names, f"{group}.{field}", kind)
-            self._numbers[group] = per_item(getattr(self, group), len(names))
-        return self._numbers
+                if isinstance(value, tuple):
+                    check_size(value, names, f"{group}.{field}", kind)
+            numbers[group] = per_item(getattr(self, group), len(names))
+        return numbers
 
-    def updated(self, **entries: Any) -> Self:
-        """Return a copy with other values of some entries, unchecked, as of any description."""
-        copy = super().updated(**entries)
-        copy._numbers = PerItem()
-        return copy
-
-    @property
-    def numbers(self) -> Mapping[str, Mapping[str, Array]]:
-        """Numbers of friction, passive tendons and stops as arrays of one per item, by table and entry."""
-        return self._numbers or self._expand()
-
-    @property
+    @cached_property
     def bodies(self) -> Tree:
         """The tree of bodies that it is made of, also where it is given by links.
 
@@ -131,8 +125,6 @@ class FingerDescription(Description):
             return self.tree
         return tree_of_links(self.joints, self.tendons) if self.hand is None else self.hand.bodies
 
-    # Read once: routing, rows, drawing and export ask for it.
-    @memoised(lambda self, name: (name, self.tendon_friction.place, self.tendons.get(name), self.tree), most=256)
     def cord(self, name: str) -> Cord:
         """Return one of its tendons as a cord, or else a tendon of its tree that something else pulls."""
         tendon = self.tendons.get(name)
@@ -151,7 +143,8 @@ class FingerDescription(Description):
     @property
     def through_space(self) -> bool:
         """Whether any of its tendons runs along a path through space, so that its arms depend on the posture."""
-        return any(self.cord(name).through_space for name in self.tendons)
+        paths = {name for name, each in self.tree.tendons.items() if each.path is not None}
+        return any(each.along in paths for each in self.tendons.values())
 
     @property
     def outline(self) -> str:
@@ -277,7 +270,7 @@ class HandSettings(Description):
         """Return the fingers as they are on the hand, by name: to scale, with gravity in their own base frames."""
         return {name: placed_finger(name, placed, self.gravity) for name, placed in self.fingers.items()}
 
-    @property
+    @cached_property
     def bodies(self) -> Tree:
         """Bodies of all fingers, and the palm's, as one tree in the palm's frame."""
         places = {name: (placed.position, quaternion(*placed.orientation)) for name, placed in self.fingers.items()}

@@ -36,6 +36,7 @@ class Routing:
     Attributes:
         joints: Names of the n joints.
         cords: The t tendons by name, actuated first.
+        canals: The tendons of its tree that something else pulls, by name.
         actuated: Number a of actuated tendons.
         fingers: Of every finger the indices of its joints and of its tendons; of one finger all.
         winched: Which actuated tendons an ideal winch winds: their input is a length, m; shape (a,).
@@ -43,6 +44,7 @@ class Routing:
 
     joints: tuple[str, ...]
     cords: Mapping[str, Cord]
+    canals: Mapping[str, Cord]
     actuated: int
     fingers: tuple[tuple[Indices, Indices], ...]
     winched: NDArray[np.bool_]
@@ -51,16 +53,27 @@ class Routing:
     @memoised(lambda _, description: routing_parts(description))
     def from_description(cls, description: FingerDescription) -> Routing:
         """Read the tendons of a finger."""
-        joints, cords = tuple(description.joints), {name: description.cord(name) for name in description.tendons}
+        joints, groups = tuple(description.joints), (description.tendons, description.canals)
+        cords, canals = ({name: description.cord(name) for name in names} for names in groups)
         names = [""] if description.hand is None else [f"{name}." for name in description.hand.fingers]
         fingers = tuple((_beginning(joints, name), _beginning(tuple(cords), name)) for name in names)
         winched = [description.tendons[name].winch is not None for name in description.actuated_names]
-        return cls(joints, cords, len(winched), fingers, np.array(winched, bool))
+        return cls(joints, cords, canals, len(winched), fingers, np.array(winched, bool))
 
     @cached_property
     def tendons(self) -> tuple[str, ...]:
         """Names of the t tendons, actuated first."""
         return tuple(self.cords)
+
+    @cached_property
+    def wraps(self) -> tuple[tuple[Cord, ...], ...]:
+        """The places where each tendon, and then each canal of the tree, rubs."""
+        return tuple(cord.wraps for cord in (*self.cords.values(), *self.canals.values()))
+
+    @cached_property
+    def first_turns(self) -> Array:
+        """Turns of the first place where each tendon rubs over the rotation of joints (15), shape (t, n)."""
+        return self._rows(places[0].turns(self.joints) for places in self.wraps[: len(self.cords)])
 
     @cached_property
     def coupling(self) -> Array:

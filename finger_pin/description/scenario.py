@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 from pydantic_core import PydanticCustomError
 
-from finger_pin.description.caching import memoised
+from finger_pin.description.caching import cached_property
 from finger_pin.description.commands import BY_NAME, BY_SOURCE
 from finger_pin.description.controller import ControllerSettings, check_controller
 from finger_pin.description.coupling import PassiveCoupling, slack_lengths
@@ -161,12 +161,12 @@ class Scenario(Description):
             return {"": self}
         if len(self.hand.fingers) == 1 and not (self.controller.fingers or self.environment.fingers):
             return dict.fromkeys(self.hand.fingers, self)
-        return self._parts(*self.hand.fingers)
+        return self._parts
 
     # Who runs it asks again for what checked it.
-    @memoised(lambda self, *fingers: (self, *fingers), most=8)
-    def _parts(self, *fingers: str) -> dict[str, Scenario]:
-        return {name: self._part(name) for name in fingers}
+    @cached_property
+    def _parts(self) -> dict[str, Scenario]:
+        return {name: self._part(name) for name in self.hand.fingers} if self.hand else {}
 
     def environments(self) -> dict[str, EnvironmentSettings]:
         """Return the environments of a hand's fingers, or all tips of trees, by name; of a single one under no name."""

@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import Field, model_validator
 from scipy.spatial.transform import Rotation
 
+from finger_pin.description.caching import cached_property
 from finger_pin.description.cords import Cord, CordElement
 from finger_pin.description.meshes import Mesh
 from finger_pin.description.objects import Object
@@ -232,48 +233,48 @@ class Tree(Description):
                 before, wrap = waypoint, None
         return parts
 
-    @property
+    @cached_property
     def rubbing(self) -> tuple[str, ...]:
         """Names of the tendons that rub: springs, ranges, actuators, couplings or what drives their joint pulls them.
 
         A sum of joint positions is a cord where it winds about hinges at radii; else it is a transmission.
         """
-        return tuple(
-            name for name in self.tendons if self._is_cord(name) and (self._is_pulled(name) or self.linked(name))
-        )
+        pulled = {name for name, each in self.tendons.items() if each.stiffness > 0.0 or each.range is not None}
+        pulled |= {*self.linked, *filter(self._is_driven, self.tendons)}
+        return tuple(name for name in self.tendons if name in pulled and self._is_cord(name))
 
     def _is_cord(self, name: str) -> bool:
         around = self.tendons[name].wound.items()
         return all(self.joints[joint].kind == "hinge" and abs(radius) <= LARGEST_RADIUS for joint, radius in around)
 
-    def _is_pulled(self, name: str) -> bool:
-        tendon = self.tendons[name]
-        driven = drivers(self.actuators, "tendon", name) or coupled(self.couplings, name)
-        return bool(driven) or tendon.stiffness > 0.0 or tendon.range is not None
+    def _is_driven(self, name: str) -> bool:
+        return bool(drivers(self.actuators, "tendon", name) or coupled(self.couplings, name))
 
-    def linked(self, name: str) -> dict[str, float]:
-        """Return the shares of actuators' forces that pull a cord about the one joint that they drive, by actuator.
+    @cached_property
+    def linked(self) -> dict[str, dict[str, float]]:
+        """Shares of actuators' forces that pull a cord about the one joint that they drive, by cord and actuator.
 
         A model whose actuators turn joints says nothing of the cords that do it: those about a joint that pull the same
-        way share its torque. Empty for cords that have a spring, a coupling or an actuator of their own.
+        way share its torque. Cords that have a spring, a coupling or an actuator of their own are left out.
         """
-        tendon = self.tendons[name]
-        driven = drivers(self.actuators, "tendon", name) or coupled(self.couplings, name)
-        if len(tendon.wound) != 1 or driven or tendon.stiffness > 0.0:
-            return {}
-        ((joint, radius),) = tendon.wound.items()
-        sharing = sum(other * radius > 0.0 for other in self._radii_about(joint))
-        turning = drivers(self.actuators, "joint", joint).items()
-        return {key: -each.gear / (radius * sharing) for key, each in turning}
+        shares = dict[str, dict[str, float]]()
+        for name, (joint, radius) in self._only_joints.items():
+            turning = drivers(self.actuators, "joint", joint)
+            if turning and not self._is_driven(name) and not self.tendons[name].stiffness > 0.0:
+                shared = radius * sum(at == joint and other * radius > 0.0 for at, other in self._only_joints.values())
+                shares[name] = {key: -each.gear / shared for key, each in turning.items()}
+        return shares
 
-    def opposed(self, name: str) -> bool:
-        """Return whether another cord pulls the other way about the only joint of a cord."""
-        ((joint, radius),) = self.tendons[name].wound.items()
-        return any(other * radius < 0.0 for other in self._radii_about(joint))
+    @cached_property
+    def opposed(self) -> frozenset[str]:
+        """Names of the cords about a single joint that another one turns the other way."""
+        ways = {(joint, radius > 0.0) for joint, radius in self._only_joints.values()}
+        return frozenset(name for name, (joint, radius) in self._only_joints.items() if (joint, radius < 0.0) in ways)
 
-    def _radii_about(self, joint: str) -> list[float]:
-        """Return the radii of the cords that wind about one joint alone."""
-        return [each.wound[joint] for each in self.tendons.values() if [*each.wound] == [joint]]
+    @cached_property
+    def _only_joints(self) -> dict[str, tuple[str, float]]:
+        """Joints and radii, m, of the cords that wind about one joint alone, by cord."""
+        return {name: (*each.wound.items(),)[0] for name, each in self.tendons.items() if len(each.wound) == 1}
 
     def joints_of(self, body: str) -> list[str]:
         """Return the joints of a body on its parent, in order."""

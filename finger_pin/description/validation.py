@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints, ValidationError
 from pydantic_core import PydanticCustomError
 
+from finger_pin.description.caching import Frozen
 from finger_pin.description.fields import document, field_names, nested
 from finger_pin.exceptions import InputError
 
@@ -36,14 +37,14 @@ Table = dict[str, Any]
 _Model = TypeVar("_Model", bound="Description")
 
 
-class Description(BaseModel):
+class Description(Frozen):
     """Base of all descriptions: frozen, no unknown entries, finite numbers only.
 
     Attributes:
         file_keys: Further keys of its table in a file, which loading resolves.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, defer_build=True)
     file_keys: ClassVar[tuple[str, ...]] = ()
 
     def updated(self, **entries: Any) -> Self:
@@ -191,7 +192,9 @@ def choices(name: Any, names: Iterable[str]) -> str:
 def expand(value: Numbers, size: int) -> NDArray[np.float64]:
     """Return one number per item, shape (size,), from one number for all or one for each."""
     if isinstance(value, int | float):
-        return np.full(size, float(value))
+        numbers = np.empty(size)
+        numbers.fill(value)
+        return numbers
     if len(value) == size:
         return np.array(value, dtype=float)
     return np.broadcast_to(np.asarray(value, dtype=float), (size,)).copy()

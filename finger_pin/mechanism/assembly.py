@@ -23,9 +23,8 @@ from finger_pin.mechanism.rows import Rows, state_scales
 from finger_pin.mechanism.servos import Actuators
 from finger_pin.mechanism.sheaths import in_sheaths
 from finger_pin.mechanism.state import BLOCKS, Layout
-from finger_pin.mechanism.tendon_paths import TendonPaths
 from finger_pin.mechanism.tendons import Tendons
-from finger_pin.mechanism.tree_mechanism import along_paths, tree_rows
+from finger_pin.mechanism.tree_mechanism import TreePaths, along_paths
 from finger_pin.mechanism.wiring import replace_tables
 from finger_pin.typing import Array
 
@@ -55,7 +54,7 @@ class Parts(NamedTuple):
         routing = Routing.from_description(description)
         return cls(
             routing,
-            Tendons.from_description(description),
+            Tendons(description, routing),
             Actuators.from_description(description, routing),
             JointFriction(description, routing),
             StrokeLimiter(description),
@@ -89,7 +88,7 @@ class Assembly(NamedTuple):
 
 
 def assemble(
-    description: FingerDescription, body: RigidBody, paths: TendonPaths, parts: Parts, args: ConstructorArgs
+    description: FingerDescription, body: RigidBody, paths: TreePaths, parts: Parts, args: ConstructorArgs
 ) -> Assembly:
     """Return the rows of a description, in the order in which their states stand, joined by (18).
 
@@ -104,7 +103,8 @@ def assemble(
     routing, tendons, actuators, joint_friction, stroke_limiter, springs = parts
     width = parts.width
     # Dry friction of a tree's tendons has states of its own, which stand with those of the user's rows.
-    of_tree = {table.group: table for table in tree_rows(description, paths, width)}
+    joints = np.arange(len(routing.joints))
+    of_tree = {table.group: table.embed_coordinates(joints, width) for table in paths.tables}
     dry_friction = [of_tree.pop(group) for group in ("tendon_dry_friction",) if group in of_tree]
     custom_drives = [table for table in args.rows if table.pulls]
     pulling = [*actuators.tendon_rows(width), *tendons.sources(width)]

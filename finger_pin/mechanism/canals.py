@@ -62,9 +62,8 @@ class Canals:
         self.loads: dict[str, Array] = {}
         # They load the pins by themselves.
         self._loading = {"driven_tendons", *drive_matrices}
-        # Asked once: of many cords it takes as many looks at all actuators.
         rubbing = self._tree.rubbing
-        shares = {name: each for name in rubbing if (each := self._tree.linked(name))}
+        shares = {name: self._tree.linked[name] for name in rubbing if name in self._tree.linked}
         cords = [self._cords(shares, rows)] if shares else []
         own, actuated = len(tendons.routing.tendons), tendons.routing.actuated
         pulls = [self._pull(name) for name in rubbing]
@@ -143,7 +142,7 @@ class Canals:
         for key, part in coupled(tree.couplings, name).items():
             sources["coupling", key] = part
             one_way = False
-        if tree.linked(name):
+        if name in tree.linked:
             sources[CORDS, name] = 1.0
         return sources, one_way
 
@@ -157,7 +156,7 @@ class Canals:
             group=CORDS,
             law=CORD_TENSION,
             names=tuple(cords),
-            parameters=np.array([[float(not tree.opposed(name)) for name in cords]]),
+            parameters=np.array([[float(name not in tree.opposed) for name in cords]]),
             arm=np.zeros((len(cords), self._width)),
             inputs=_input_weights(shares, rows),
             powers=(SOURCES,),
@@ -191,7 +190,8 @@ class Canals:
     def _load_pins(self, wraps: Sequence[Cord], tension: Mapping[str, Array]) -> None:
         """Record how rows load the pins of the joints that wraps cross, by their weights in the wraps' tensions."""
         bearings = zip(self._joints, self._description.bearings, strict=True)
-        crossed = np.array([[float(rubs and name in wrap.crossed) for wrap in wraps] for name, rubs in bearings])
+        joints = [wrap.crossed for wrap in wraps]
+        crossed = np.array([[float(rubs and name in each) for each in joints] for name, rubs in bearings])
         for group, weights in tension.items():
             if group not in self._loading and np.any(pressing := crossed @ weights):
                 self.loads[group] = self.loads.get(group, 0.0) + pressing

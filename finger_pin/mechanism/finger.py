@@ -130,6 +130,9 @@ class Finger:
         args = self.constructor_args
         finger = Finger(description, args.rigid_body, args.rows, objects, args.tables)
         finger.visuals = self.visuals
+        if finger.layout == self.layout:
+            # With all that follows from it.
+            finger.layout = self.layout
         return finger
 
     def with_prescribed_joints(self) -> Finger:

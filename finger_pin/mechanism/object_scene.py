@@ -64,12 +64,14 @@ class Scene:
         free: Objects that move, freely or along paths.
         body: The finger's rigid body, and the free objects after its joints.
         contacts: Between links and objects, links of different fingers, and objects.
+        turning: Paths whose arms are those of torques about the axes of free objects, by name.
     """
 
     objects: Mapping[str, Object]
     free: Mapping[str, Object]
     body: RigidBody
     contacts: Rows
+    turning: Mapping[str, tuple[tuple[PathTerm, ...], ...]]
 
     @classmethod
     def from_mechanism(
@@ -114,20 +116,20 @@ class Scene:
             if obj.path and mechanism.moved:
                 raise InputError(f"environment.objects.{name}.path", "is for a palm at rest; leave out hand.palm.path")
         width = int(extended.model.nv) + len(mechanism.lumps)
-        contacts = cls._contacts(mechanism.body.topology, objects, description, extended, width, placed)
-        return cls(objects, free, extended, contacts)
+        pieces = cls._pieces(mechanism.body.topology, objects, description, extended, width, placed)
+        return cls(objects, free, extended, *pieces)
 
     @staticmethod
     @memoised(_touching)
-    def _contacts(
+    def _pieces(
         topology: Hashable,
         objects: Mapping[str, Object],
         description: FingerDescription,
         extended: RigidBody,
         width: int,
         placed: Mapping[str | None, Placed],
-    ) -> Rows:
-        """Return the contacts of links and objects."""
+    ) -> tuple[Rows, dict[str, tuple[tuple[PathTerm, ...], ...]]]:
+        """Return the contacts of links and objects, and the paths about the axes of free objects."""
         hand = description.hand
         # Of a model of the user's own joints have the places of links.
         places = placed or {
@@ -142,7 +144,14 @@ class Scene:
                     raise InputError(f"environment.objects.{name}", f"a {kind} has this name; choose another")
         solids = [*bodies, *object_solids(objects, extended)]
         never = pairs_apart(objects, [each.name for each in solids])
-        return contact_rows(solids, width, pairs_within(description), never)
+        turning = dict[str, tuple[tuple[PathTerm, ...], ...]]()
+        for name in [name for name in objects if extended.model.existJointName(f"{name}_attitude")]:
+            body: dict[str | None, Placed] = {
+                name: Placed(int(extended.model.getJointId(f"{name}_attitude")), pin.SE3.Identity())
+            }
+            turns = [Wrench(body=name, torque=tuple(unit)) for unit in np.eye(3).tolist()]
+            turning[name] = tuple(wrench_legs(body, turn, 1.0) for turn in turns)
+        return contact_rows(solids, width, pairs_within(description), never), turning
 
     def extend(self, mechanism: Mechanism) -> Mechanism:
         """Return a mechanism with the scene: free objects after the joints, contacts before all other rows.
@@ -168,16 +177,12 @@ class Scene:
         """Return the table of dampers of free objects, whose coordinates begin at a given one, if there are any."""
         names, numbers, arms, paths = list[str](), list[float](), list[Array](), list[tuple[PathTerm, ...]]()
         for k, (name, each) in enumerate(self.free.items()):
-            body: dict[str | None, Placed] = {
-                name: Placed(int(self.body.model.getJointId(f"{name}_attitude")), pin.SE3.Identity())
-            }
-            for axis, unit, arm in zip("xyz", np.eye(3), np.eye(3, width, first + VELOCITY * k), strict=True):
+            for axis, about, arm in zip("xyz", self.turning[name], np.eye(3, width, first + VELOCITY * k), strict=True):
                 if each.damping:
                     names, numbers = [*names, f"{name}.{axis}"], [*numbers, each.damping]
                     arms, paths = [*arms, arm], [*paths, ()]
                 if each.angular_damping:
                     # Within a step, coordinates of attitudes are angles about three axes, not turns about the body's.
-                    about = wrench_legs(body, Wrench(body=name, torque=tuple(unit.tolist())), 1.0)
                     names, numbers = [*names, f"{name}.about_{axis}"], [*numbers, each.angular_damping]
                     arms, paths = [*arms, np.zeros(width)], [*paths, about]
         damping, powers = np.array(numbers), (Energy("object_damping", "dampers of free objects"),)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -86,8 +86,7 @@ class PathElement:
 
 
 # Compared by value, with its piece by identity: rows made anew of the same pieces have the same structure.
-@dataclass(frozen=True)
-class PathTerm:
+class PathTerm(NamedTuple):
     """The use of a piece by a row.
 
     Attributes:

@@ -136,14 +136,14 @@ class Rows:
             "parameters": (self.parameters, (len(self.law.parameters), len(self.names)), None),
             "arm": (self.arm, (count, width), None),
             "measure": (self.measure, (count, width), self.arm),
-            "offset": (self.offset, (count,), np.zeros(count)),
-            "channels": (self.channels, (count,), np.full(count, -1)),
-            "pins": (self.pins, (count,), np.full(count, -1)),
-            "bends": (self.bends, (count, width), np.zeros((count, width))),
-            "curvature_offset": (self.curvature_offset, (count,), np.zeros(count)),
+            "offset": (self.offset, (count,), 0.0),
+            "channels": (self.channels, (count,), -1),
+            "pins": (self.pins, (count,), -1),
+            "bends": (self.bends, (count, width), 0.0),
+            "curvature_offset": (self.curvature_offset, (count,), 0.0),
         }
         for name, (value, shape, default) in shapes.items():
-            array = np.asarray(default if value is None else value)
+            array = np.asarray(value) if value is not None or default is None else np.full(shape, default)
             if array.shape != shape:
                 raise InputError(f"rows.{self.group}.{name}", f"must have shape {shape}, not {array.shape}")
             object.__setattr__(self, name, array)

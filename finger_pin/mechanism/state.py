@@ -256,10 +256,9 @@ class Layout:
 
     @cached_property
     def _scales(self) -> Array:
-        blocks = zip(BLOCKS.values(), self.sizes, strict=True)
-        scales = np.concatenate([np.resize(block.scale, size) for block, size in blocks])
-        for kind, values in self.scaled:
-            scales[self._parts[kind]] = values
+        scales, scaled = np.zeros(self.size), dict(self.scaled)
+        for kind, part in self._filled:
+            scales[part] = scaled.get(kind) or np.resize(BLOCKS[kind].scale, part.stop - part.start)
         return scales
 
 

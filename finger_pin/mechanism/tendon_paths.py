@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -68,10 +68,10 @@ class TendonPaths:
                 continue
             leg = PathTerm(self.pieces[element], arm=factor, follows=element.follows)
             if k >= cord.first:
-                legs.append(replace(leg, bends=cord.last is None or k < cord.last))
+                legs.append(leg._replace(bends=cord.last is None or k < cord.last))
             else:
                 # The leg before says which way the cord comes, if its ends lie apart.
-                legs = [*(() if self._is_long(leg.piece) else legs), replace(leg, arm=0.0, bends=False)]
+                legs = [*(() if self._is_long(leg.piece) else legs), leg._replace(arm=0.0, bends=False)]
         behind = (
             PathTerm(self.pieces[element], arm=factor * (1.0 / branch.divisor), follows=element.follows, bends=False)
             for branch in cord.branches
@@ -107,22 +107,23 @@ class TendonPaths:
 
         Their shape is (..., t), m; what is on joints alone is at zero there.
         """
-        drawn = np.asarray(q @ self._routing.coupling.T)
+        drawn = np.asarray(q @ self.routing.coupling.T)
         if self.cords:
-            if self._routing.through_space.any():
-                drawn[..., self._routing.through_space] = -self._kinematics(self._own, q)[0]
+            if self.routing.through_space.any():
+                drawn[..., self.routing.through_space] = -self._kinematics(self._own, q)[0]
             drawn += [self.reference_lengths.get(each.along, 0.0) for each in self.description.tendons.values()]
         return drawn
 
     def coupling(self, q: Array) -> Array:
         """Return their derivatives by q, shape (..., n), at postures: shape (..., t, n), m."""
-        coupling = np.broadcast_to(self._routing.coupling, (*q.shape[:-1], *self._routing.coupling.shape)).copy()
-        if self._routing.through_space.any():
-            coupling[..., self._routing.through_space, :] = -self._kinematics(self._own, q)[1]
+        coupling = np.broadcast_to(self.routing.coupling, (*q.shape[:-1], *self.routing.coupling.shape)).copy()
+        if self.routing.through_space.any():
+            coupling[..., self.routing.through_space, :] = -self._kinematics(self._own, q)[1]
         return coupling
 
     @cached_property
-    def _routing(self) -> Routing:
+    def routing(self) -> Routing:
+        """Its routing."""
         return Routing.from_description(self.description)
 
     @cached_property

@@ -50,15 +50,14 @@ class Tendons:
     @cached_property
     def wraps(self) -> tuple[tuple[Cord, ...], ...]:
         """The places where each of its tendons, and of those of its tree, rubs, behind sheaths with pieces."""
-        cords, places = {**self.routing.cords}, list[tuple[Cord, ...]]()
+        places = list(self.routing.wraps)
         for name, wound in self.description.drive_cords.items():
             if wound.pieces:
-                cords[name] = cords[name]._replace(curvature_offset=0.0)
-        for cord, whole in zip(cords.values(), self.routing.cords.values(), strict=True):
-            # The sheath is one more of them.
-            count = len(cord.wraps) + (cord is not whole)
-            places.append(tuple(wrap._replace(share=1.0 / count) for wrap in cord.wraps))
-        return (*places, *(self.description.cord(name).wraps for name in self.description.canals))
+                # The sheath is one more of them.
+                behind = self.routing.cords[name]._replace(curvature_offset=0.0).wraps
+                share = 1.0 / (1 + len(behind))
+                places[self.routing.tendons.index(name)] = tuple(wrap._replace(share=share) for wrap in behind)
+        return tuple(places)
 
     @cached_property
     def several(self) -> dict[int, list[tuple[Array, float, NDArray[np.bool_]]]]:
@@ -76,7 +75,7 @@ class Tendons:
         return found
 
     def _number(self, entry: str) -> Array:
-        return self.description.numbers["tendon_friction"][entry][: len(self.routing.tendons)]
+        return self.description.numbers["tendon_friction"][entry][: len(self.routing.cords)]
 
     @property
     def surface(self) -> Array:
@@ -250,7 +249,7 @@ class Tendons:
         first = [places[0] for places in self.wraps[: len(routing.tendons)]]
         driven[:, :joints] = routing.coupling
         driven[actuated:] = np.eye(passive, width, joints)
-        bends[:, :joints] = np.reshape([wrap.turns(routing.joints) for wrap in first], (-1, joints))
+        bends[:, :joints] = routing.first_turns
         offset, names = np.array([wrap.offset for wrap in first]), routing.passive_names
         friction = self.at(range(len(first)), first)
         wired = drive_matrices(drives, routing.tendons[:actuated])

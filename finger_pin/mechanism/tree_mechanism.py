@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.polynomial import Polynomial
 
-from finger_pin.description.caching import memoised
+from finger_pin.description.caching import cached_property, memoised
 from finger_pin.description.cords import Cord, CordElement
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.routing import routing_parts
@@ -36,7 +36,19 @@ _DRY_STICTION = 1e-4
 _INPUT_LAG, _UNLIMITED = 1e-4, (-np.inf, np.inf)
 
 
-def build_body(description: FingerDescription, body: RigidBody | None = None) -> tuple[RigidBody, TendonPaths]:
+class TreePaths(TendonPaths):
+    """Tendons of a finger, with the rows of its tree: pieces of their paths are the same while no other part changes.
+
+    Structures are built once for the same pieces.
+    """
+
+    @cached_property
+    def tables(self) -> tuple[Rows, ...]:
+        """Rows of the tree, without the friction of loaded tendons, for the coordinates of its joints."""
+        return tuple(_tree_rows(self.description, self))
+
+
+def build_body(description: FingerDescription, body: RigidBody | None = None) -> tuple[RigidBody, TreePaths]:
     """Return the rigid body that a finger's links or bodies make, with its gravity, and the tendons on it.
 
     Args:
@@ -47,13 +59,20 @@ def build_body(description: FingerDescription, body: RigidBody | None = None) ->
         return _tendons_on_bodies(description)
     if description.tree.bodies:
         raise InputError("rigid_body", "has no place beside a tree, whose bodies are its own")
-    return body, TendonPaths(body, description, {})
+    return body, TreePaths(body, description, {})
 
 
-@memoised(lambda it: (place_bodies(it)[0], *routing_parts(it)))
-def _tendons_on_bodies(description: FingerDescription) -> tuple[RigidBody, TendonPaths]:
+def _parts(description: FingerDescription) -> tuple[object, ...]:
+    """Return the parts of a description that its tendons and the rows of its tree depend on."""
+    couplings = description.tree.couplings.values()
+    middles = (description.joints[each.other].range for each in couplings if each.other and any(each.higher))
+    return (place_bodies(description)[0], *routing_parts(description), *middles)
+
+
+@memoised(_parts)
+def _tendons_on_bodies(description: FingerDescription) -> tuple[RigidBody, TreePaths]:
     body, placed = place_bodies(description)
-    return body, TendonPaths(body, description, placed)
+    return body, TreePaths(body, description, placed)
 
 
 def along_paths(description: FingerDescription, paths: TendonPaths, table: Rows) -> Rows:
@@ -64,14 +83,14 @@ def along_paths(description: FingerDescription, paths: TendonPaths, table: Rows)
     if (table.group != "driven_tendons" and not table.pulls) or not paths.cords:
         return table
     names, arm = table.pulls or table.names, table.arm.copy()
-    arm[:, : len(description.joints)], legs = paths.along([description.cord(name).wraps[0] for name in names], -1.0)
+    arm[:, : len(description.joints)], legs = paths.along([paths.routing.cords[name].wraps[0] for name in names], -1.0)
     drawn = [paths.reference_lengths.get(description.tendons[name].along, 0.0) for name in names]
     return replace(table, arm=arm, measure=arm, offset=table.offset + drawn, paths=legs)
 
 
-def tree_rows(description: FingerDescription, routes: TendonPaths, width: int) -> list[Rows]:
-    """Return the rows of a tree, without the friction of loaded tendons, for a number of coordinates."""
-    tree = description.tree
+def _tree_rows(description: FingerDescription, routes: TendonPaths) -> list[Rows]:
+    """Return the rows of a tree, without the friction of loaded tendons, for the coordinates of its joints."""
+    tree, width = description.tree, len(description.joints)
 
     def table(group: str, names: Iterable[str], numbers: _Numbers, along: tuple[Array, Paths], **further: Any) -> Rows:
         arms, paths = along

@@ -14,12 +14,13 @@ from finger_pin.typing import Array
 
 def sort_tables(tables: Sequence[Rows]) -> tuple[Rows, ...]:
     """Return tables sorted so that every force is evaluated before it is read, stable otherwise."""
-    names = [table.group for table in tables]
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError("rows", "two tables have this name; choose another", name)
+    counts = {table.group: table.count for table in tables}
+    if len(counts) < len(tables):
+        names = [table.group for table in tables]
+        raise InputError("rows", "two tables have this name; choose another", max(names, key=names.count))
+    stateful = {table.group: table.count for table in tables if table.states == table.count}
     for table in tables:
-        _check_wiring(table, tables)
+        _check_wiring(table, counts, stateful)
     readers = {table.group: {*table.inputs, *table.loads} for table in tables}
     try:
         TopologicalSorter(readers).prepare()
@@ -27,12 +28,12 @@ def sort_tables(tables: Sequence[Rows]) -> tuple[Rows, ...]:
         # In the circle each one is read by the next.
         circle = " reads ".join(reversed(error.args[1]))
         raise InputError("rows", f"no force may depend on itself: {circle}") from None
-    left, ordered = list(tables), list[Rows]()
+    left, ordered = list(tables), dict[str, Rows]()
     while left:
-        placed = {table.group for table in ordered}
-        ordered.append(next(table for table in left if readers[table.group] <= placed))
-        left.remove(ordered[-1])
-    return tuple(ordered)
+        table = next(table for table in left if readers[table.group] <= ordered.keys())
+        left.remove(table)
+        ordered[table.group] = table
+    return tuple(ordered.values())
 
 
 def replace_tables(tables: Sequence[Rows], replacements: Mapping[str, Callable[[Rows], Rows]]) -> list[Rows]:
@@ -52,10 +53,15 @@ def replace_tables(tables: Sequence[Rows], replacements: Mapping[str, Callable[[
     return placed
 
 
-def _check_wiring(table: Rows, tables: Sequence[Rows]) -> None:
-    """Refuse a table that reads unknown forces or states, or with weights of the wrong shape."""
-    for wiring in ("inputs", "loads", "readings"):
-        counts = {each.group: each.count for each in tables if wiring != "readings" or each.states == each.count}
+def _check_wiring(table: Rows, every: Mapping[str, int], stateful: Mapping[str, int]) -> None:
+    """Refuse a table that reads unknown forces or states, or with weights of the wrong shape.
+
+    Args:
+        table: The table.
+        every: Counts of the rows of all tables, by name.
+        stateful: Those of tables with a state in each row.
+    """
+    for wiring, counts in (("inputs", every), ("loads", every), ("readings", stateful)):
         for group, weights in getattr(table, wiring).items():
             entry, of_states = f"rows.{table.group}.{wiring}", " with a state in each row" * (wiring == "readings")
             if group not in counts:

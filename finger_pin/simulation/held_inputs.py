@@ -32,7 +32,9 @@ class HeldInputs:
         self._loop, self.goals = loop, goals
         self.values, self.force = np.zeros(finger.mechanism.channels), loop.fingertip_force
         self._queue = InputQueue(input_delays(finger.description, finger.routing))
-        self._tension_channels = np.setdiff1d(np.flatnonzero(~finger.routing.winched), finger.actuators.voltages)
+        pulls = ~finger.routing.winched
+        pulls[finger.actuators.voltages] = False
+        self._tension_channels = np.flatnonzero(pulls)
 
     def check(self, inputs: Inputs, dt: float, fingertip_force: ArrayLike | None) -> tuple[Array, Array]:
         """Return inputs and force of a step as arrays; refuse what is wrong with them or its duration, s."""

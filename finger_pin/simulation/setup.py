@@ -79,15 +79,15 @@ class Setup:
         """
         method = scenario.simulation.method
         loop = loop or ClosedLoop.from_scenario(scenario)
-        if loop.finger.actuators.names:
-            # Before the controller is sampled: then it must not be asked for a start.
-            loop = replace(loop, start=loop.initial_state())
-            check_motors(loop.finger, loop.initial_state())
+        # Before the controller is sampled: then it must not be asked for a start.
+        start_state = loop.initial_state()
+        loop = replace(loop, start=start_state)
+        check_motors(loop.finger, start_state)
         if loop.finger.scene is not None:
-            loop.finger.scene.check(loop.finger.layout.unpack(loop.initial_state()))
+            loop.finger.scene.check(loop.finger.layout.unpack(start_state))
         if "initial state" not in custom:
             # A state of one's own, as of a result, may lean on a stop.
-            warn_beyond_ranges(loop.finger, loop.initial_state())
+            warn_beyond_ranges(loop.finger, start_state)
         sampling = sampling_settings(scenario, control_period)
         if sampling is None and (loop.controller.needs_sensors or loop.controller.sensors):
             raise InputError("control_period", "is missing: a controller that reads sensors is sampled")

@@ -53,7 +53,7 @@ def _shift_joints(paths: Paths, shift: int) -> tuple[tuple[PathTerm, ...], ...]:
         ends = tuple(replace(end, joint=end.joint and end.joint + shift) for end in piece.ends)
         return replace(piece, ends=ends, joint=piece.joint and piece.joint + shift)
 
-    return tuple(tuple(replace(leg, piece=piece_there(leg.piece)) for leg in legs) for legs in paths)
+    return tuple(tuple(leg._replace(piece=piece_there(leg.piece)) for leg in legs) for legs in paths)
 
 
 def join_bodies(parts: Mapping[str, RigidBody], places: Mapping[str, pin.SE3] | None = None) -> RigidBody:

@@ -217,7 +217,7 @@ def with_other_numbers(mechanism, rng):
         if id(piece) not in moved:
             ends = tuple(Place(end.joint, end.point + 0.1 * rng.normal(size=3)) for end in piece.ends)
             moved[id(piece)] = replace(piece, ends=ends, frame=random_placement(rng))
-        return replace(leg, piece=moved[id(piece)])
+        return leg._replace(piece=moved[id(piece)])
 
     def scaled(matrix):
         return matrix * rng.uniform(0.5, 1.5, np.shape(matrix))

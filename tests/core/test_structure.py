@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from palm_cases import alone_under_turned_gravity, changed, scenario_of
 from random_mechanisms import random_mechanism, random_states
 from test_any_mechanism import assert_same
 
@@ -29,7 +30,7 @@ def test_a_mechanism_with_other_numbers_has_the_structure_and_islands_of_the_fir
     islands = selections(structure, control)
     assert len(islands) > 1 and selections(same, control) is islands
     for island in islands:
-        anew = Selection.from_island(structure, island.island)
+        anew = Selection.from_island(structure, island.island, control)
         assert all(map(np.array_equal, leaves(island.structure), leaves(anew.structure)))
         assert all(map(np.array_equal, leaves(island.parameters(changed)), leaves(anew.parameters(changed))))
     pairs = [(leaves(island.parameters(numbers)), leaves(island.parameters(changed))) for island in islands]
@@ -51,3 +52,32 @@ def test_arms_are_parameters_but_one_that_becomes_zero_changes_the_structure(see
         other = with_arms(change)
         assert (compile_mechanism(other)[0] is structure) == kept
         assert_same(CompiledMechanism(other).evaluate(x, command), other.evaluate(x, command), other)
+
+
+@pytest.mark.parametrize("prefix", ["finger", "hand.fingers.left.finger"])
+def test_numbers_beside_a_tree_keep_the_structure_of_its_rows_and_of_free_objects(prefix):
+    """Wrenches, loops, weights, powers of couplings, cords, and dampers of objects have pieces of paths."""
+    push = {"wrench": {"body": "slider", "force": [0.1, 0.2, 0.0], "torque": [0.0, 0.01, 0.0], "axes": "other"}}
+    finger, ball = changed(tree__actuators__push=push), {"shape": "sphere", "radius": 0.01, "mass": 0.01}
+    ball |= {"position": [0.5, 0.0, 0.0], "angular_damping": 1e-5}
+    around = {"environment": {"objects": {"ball": ball}}}
+    alone = prefix == "finger"
+    scenario = (
+        alone_under_turned_gravity("left", finger, **around) if alone else scenario_of({"left": finger}, **around)
+    )
+
+    def structure(**entries):
+        keys = {key.replace("__", "."): value for key, value in entries.items()}
+        objects = {key: keys.pop(key) for key in [*keys] if key.startswith("environment")}
+        one = fp.load_scenario(scenario, {f"{prefix}.{key}": value for key, value in keys.items()} | objects)
+        return compile_mechanism(fp.Finger(one.finger, objects=one.environment.objects).mechanism)[0]
+
+    first = structure()
+    assert {"gravity_compensation", "loop", "coupling", "object_damping"} <= {
+        table.group for table in fp.Finger(scenario.finger, objects=scenario.environment.objects).mechanism.rows
+    }
+    assert structure(tendon_friction__coulomb=[0.15, 0.25], joint_friction__viscous=1e-4) is first
+    assert structure(joints__thrust__range=[-0.02, 0.02], stroke_limiter__stiffness=60.0) is first
+    assert structure(environment__objects__ball__angular_damping=2e-5) is first
+    # Powers of an angle are measured from the middle of its range.
+    assert structure(joints__bend__range=[-0.4, 1.5]) is not first

@@ -1,7 +1,9 @@
 """What is remembered: the same thing for the same parts, up to a number of things, also in a forked process."""
 
+import copy
 import gc
 import os
+import pickle
 import signal
 import threading
 import time
@@ -63,6 +65,17 @@ def test_descriptions_are_told_apart_by_identity_also_when_one_has_gone():
         description = fp.load_finger("ub").updated(name=f"finger{number}")
         assert known(description) == f"finger{number}"
         del description
+
+
+def test_what_follows_from_a_description_is_held_once_and_not_by_changed_copies_and_pickles():
+    finger = fp.load_finger("ub")
+    assert finger.numbers is finger.numbers and finger.bodies is finger.bodies
+    changed = finger.updated(tendon_friction={"coulomb": 0.3})
+    assert changed.numbers["tendon_friction"]["coulomb"].tolist() == [0.3] * len(finger.tendons)
+    assert changed == finger.updated(tendon_friction={"coulomb": 0.3}) and changed != finger
+    assert changed.numbers["joint_friction"] is finger.numbers["joint_friction"]
+    for same in (pickle.loads(pickle.dumps(finger)), copy.copy(finger)):
+        assert vars(same).keys() == type(finger).model_fields.keys() and same == finger
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are not forked here")

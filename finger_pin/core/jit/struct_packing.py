@@ -7,7 +7,6 @@ later call.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterator
 from typing import Any, NoReturn, TypeVar, get_type_hints
 
 import numpy as np
@@ -82,12 +81,14 @@ def overwrite(table: tuple[Any, ...], others: tuple[Any, ...]) -> bool:
     return True
 
 
-def _entries(table: tuple[Any, ...]) -> Iterator[Any]:
+def _entries(table: tuple[Any, ...]) -> list[Any]:
+    entries: list[Any] = []
     for entry in table:
         if isinstance(entry, tuple):
-            yield from _entries(entry)
+            entries += _entries(entry)
         else:
-            yield entry
+            entries.append(entry)
+    return entries
 
 
 def empty_table(table: type[_Table]) -> _Table:

@@ -57,6 +57,8 @@ class CompiledMechanism:
 
     def rebind(self, mechanism: Mechanism) -> bool:
         """Take another mechanism of the same structure; return False if it is none, and this is of no use."""
+        if mechanism is self.mechanism:
+            return True
         self.mechanism, structure = mechanism, self.structure
         self.structure, self.parameters = compile_mechanism(mechanism)
         return structure is self.structure and self.models.rebind(self.parameters)

@@ -110,16 +110,18 @@ class Selection:
         subset: Its places by axis; None where it is the whole.
         structure: Its structure.
         groups: Numbers of its groups of rows among all.
+        inputs: Its places by axis in the inputs; None where it is the whole.
     """
 
     island: Island
     subset: Subset | None
     structure: Structure
     groups: Indices
+    inputs: Subset | None
 
     @classmethod
-    def from_island(cls, structure: Structure, island: Island) -> Selection:
-        """Return an island's part of a structure."""
+    def from_island(cls, structure: Structure, island: Island, control: InputTable) -> Selection:
+        """Return an island's part of a structure under its inputs."""
         rows, paths, size, width = island.rows, structure.paths, len(structure.parents), len(structure.prescribed)
         bodies, lumps = island.coordinates[island.coordinates < size], island.coordinates[island.coordinates >= size]
         counts = np.diff(np.searchsorted(rows, np.append(structure.groups.first, len(structure.state))))
@@ -151,7 +153,12 @@ class Selection:
             contact_rows=int(np.count_nonzero(structure.touch[rows])),
             paths=part.select(paths),
         )
-        return cls(island, part, selected, present)
+        inputs = Subset()
+        inputs.keep("coordinate", island.coordinates, len(control.gain))
+        inputs.keep("channel", island.channels, len(control.tension))
+        inputs.keep("planned", island.planned, len(control.minimum))
+        inputs.keep("loop", np.unique(control.loop[island.planned]), len(control.level))
+        return cls(island, part, selected, present, inputs)
 
     def parameters(self, parameters: Parameters) -> Parameters:
         """Return the parameters of the island."""
@@ -161,16 +168,11 @@ class Selection:
     def control(self, control: InputTable) -> InputTable:
         """Return the inputs of the island."""
         island = self.island
-        if self.subset is None:
+        if self.inputs is None:
             return control
-        part = Subset()
-        part.keep("coordinate", island.coordinates, len(control.gain))
-        part.keep("channel", island.channels, len(control.tension))
-        part.keep("planned", island.planned, len(control.minimum))
-        part.keep("loop", np.unique(control.loop[island.planned]), len(control.level))
         schedule = _chosen(control.schedule, island.channels)
         force = _chosen(control.force, (3 * island.tips[:, None] + np.arange(3)).ravel())
-        return part.select(control)._replace(schedule=schedule, force=force)
+        return self.inputs.select(control)._replace(schedule=schedule, force=force)
 
 
 @memoised(_island_key)
@@ -181,8 +183,8 @@ def selections(structure: Structure, control: InputTable) -> list[Selection]:
     if not np.array_equal(states, np.arange(len(structure.state_row))):
         raise RuntimeError(f"islands have the states {states.tolist()} of {len(structure.state_row)}")
     if len(islands) == 1:
-        return [Selection(islands[0], None, structure, np.arange(len(structure.groups.first)))]
-    return [Selection.from_island(structure, island) for island in islands]
+        return [Selection(islands[0], None, structure, np.arange(len(structure.groups.first)), None)]
+    return [Selection.from_island(structure, island, control) for island in islands]
 
 
 def _chosen(signal: SignalTable, functions: Indices) -> SignalTable:
