@@ -222,6 +222,18 @@ def maximum_tension(rng: np.random.Generator, table: Table) -> bool:
     return bool(free)
 
 
+def coupled_tendons(rng: np.random.Generator, table: Table) -> bool:
+    """Let an actuated tendon follow another, whoever pulls them."""
+    names = [name for name, each in table["finger"]["tendons"].items() if each.get("kind") != "passive"]
+    if len(names) < 2:
+        return False
+    one, other = (str(name) for name in rng.choice(names, 2, replace=False))
+    bar = {"tendon": one, "other": other, "ratio": float(rng.normal()), "offset": float(rng.normal(0.0, 5e-4))}
+    bar |= {"stiffness": decades(rng, 1e2, 1e4), "damping": decades(rng, 0.1, 10.0)}
+    table["finger"]["couplings"] = {"pair": bar}
+    return True
+
+
 def passive_tendon(rng: np.random.Generator, table: Table) -> bool:
     """Couple the last two joints by a passive tendon."""
     names = list(table["finger"]["joints"])
@@ -271,4 +283,5 @@ CHAIN_FEATURES: dict[str, Feature] = {
     "twists and offsets": twists_and_offsets,
     "uneven links": uneven_links,
     "passive tendon": passive_tendon,
+    "coupled tendons": coupled_tendons,
 } | SHARED_FEATURES

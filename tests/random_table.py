@@ -74,7 +74,7 @@ _NOT_SETTLED = (
     *("joint friction", "joint drag", "one per joint", "swinging inputs", "start time", "cord", "wraps", "pulleys"),
     *("sum of joints", "tendon range", "joint path", "coupling", "loop", "motor", "joint servo", "lag", "integrator"),
     *("integral", "slew", "delay", "muscle", "fixed object", "free object", "moved object", "keyframe"),
-    *("tendon coupling", "wrench"),
+    *("tendon coupling", "coupled tendons", "wrench"),
 )
 # What is more than tensions that are held: recordings give those alone.
 _NOT_RECORDED = ("servo", "play", "position drive", "winch", "passive tendon", *_NOT_HELD)

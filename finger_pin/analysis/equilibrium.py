@@ -167,7 +167,8 @@ class _Statics:
         theta, signals = finger.layout.unpack(x).position, finger.evaluate(x, self.command, self.tip_force)
         stored, _ = signals.mechanism.account()
         potential_energy = finger.motion(theta, np.zeros(joints)).potential_energy
-        work = (~finger.routing.winched * signals.rows["driven_tendons"].row.command) @ finger.excursion(theta)
+        driven = signals.rows["driven_tendons"]
+        work = ((1.0 - driven.rows["acting"]) * driven.row.command) @ finger.excursion(theta)
         work -= _held_by_friction(signals)
         work += float(np.sum(self.tip_force * finger.rigid_body.tip_position(theta))) + _actuator_work(signals)
         return float(sum(stored.values()) + potential_energy - work)
@@ -211,6 +212,7 @@ _UNSETTLED: tuple[tuple[str, str, str, Callable[[Any], Any], str], ...] = (
     ("goal", "actuators", "motor.friction.backlash", lambda a: a.motor.friction.backlash, "must be 0"),
     ("goal", "actuators", "position_loop.torque_off", lambda a: a.position_loop.torque_off is not None, _OUT),
     ("return", "tree.couplings", "", bool, _PULL),
+    ("return", "couplings", "", bool, _PULL),
     ("return", "tree.loops", "", bool, _PULL),
     ("return", "tree.actuators", "", lambda a: a.muscle or a.offset or a.by_length, _PULL),
 )
@@ -241,11 +243,11 @@ def _held_by_friction(signals: FingerSignals) -> float:
 
 
 def _actuator_work(signals: FingerSignals) -> float:
-    """Return the work of actuators and winches along their lengths, J; that of tensions counts with the tendons."""
+    """Return the work of actuators, winches and sources that are rows along their lengths, J."""
     return sum(
         float(np.sum(table.rows.law.work(table.row, table.rows.parameters, table.signals)))
-        for group, table in signals.mechanism.rows.items()
-        if group != SOURCES_WITH_END and table.rows.law.work is not None
+        for table in signals.mechanism.rows.values()
+        if table.rows.law.work is not None
     )
 
 

@@ -15,6 +15,7 @@ from finger_pin.description.validation import finite_vector
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.coerce import FingerLike, as_finger, at_tip, one_finger
 from finger_pin.mechanism.finger import Finger
+from finger_pin.mechanism.groups import TIES
 from finger_pin.mechanism.path_elements import path_kinematics
 from finger_pin.typing import Array
 
@@ -54,7 +55,7 @@ def _constraints(finger: Finger) -> Callable[[Array], tuple[Array, Array]]:
     """Return a function of theta: residuals of couplings and loops, shape (k,), and their slopes, (k, n)."""
     joints = len(finger.routing.joints)
     is_free = ~finger.led_joints
-    tables = [table for table in finger.mechanism.rows if table.group in ("coupling", "loop")]
+    tables = [table for table in finger.mechanism.rows if table.group in ("coupling", TIES, "loop")]
     if not tables:
         return lambda theta: (np.zeros(0), np.zeros((0, joints)))
     arm = np.concatenate([table.arm[:, :joints] for table in tables])

@@ -119,13 +119,13 @@ def _from_description(description: FingerDescription) -> tuple[Finger, Finger]:
 
 
 def _with_ideal_sources(finger: Finger) -> tuple[Finger, Finger]:
-    """Return a finger, and the same whose tendons are pulled by their inputs alone, whatever drives them."""
+    """Return a finger, and the same whose tendons are pulled by their inputs alone, whatever drives or ties them."""
     description = finger.description
     tendons = {name: each.updated(winch=None, maximum_tension=None) for name, each in description.tendons.items()}
-    if not description.actuators and tendons == description.tendons:
+    if not description.actuators and not description.couplings and tendons == description.tendons:
         return finger, finger
     objects = finger.constructor_args.objects
-    return finger, finger.changed(description.updated(actuators={}, tendons=tendons), objects)
+    return finger, finger.changed(description.updated(actuators={}, couplings={}, tendons=tendons), objects)
 
 
 def _current(actuators: Actuators, command: Array, v: Array, at_rest: bool) -> Array:

@@ -20,6 +20,7 @@ from finger_pin.description.links import placed_on_palm, tree_of_links
 from finger_pin.description.parameters import Joint, PassiveTendon, PerItem, StrokeLimiterSettings, Tendon, per_item
 from finger_pin.description.placement import PALM_POINT, Palm, joined_entries, placed_finger, quaternion, rotation
 from finger_pin.description.tree import NO_TREE, Tree
+from finger_pin.description.tree_couplings import Coupling, check_tendon_couplings
 from finger_pin.description.validation import IN_RADIANS, Description, Name, check_size, problem, quantity, real, vector
 from finger_pin.typing import Array
 
@@ -50,6 +51,7 @@ class FingerDescription(Description):
     passive_tendon: PassiveTendon = PassiveTendon()
     stroke_limiter: StrokeLimiterSettings = StrokeLimiterSettings()
     actuators: dict[Name, Actuator] = Field({}, description="By name; a tendon without one has an ideal source.")
+    couplings: dict[Name, Coupling] = Field({}, description="By name, of actuated tendons.")
     touches_itself: bool = Field(
         False,
         strict=True,
@@ -60,10 +62,7 @@ class FingerDescription(Description):
 
     @model_serializer(mode="wrap")
     def _written(self, write: Callable[[Self], dict[str, Any]]) -> dict[str, Any]:
-        written = write(self)
-        if not self.tree.bodies:
-            written.pop("tree", None)
-        return written
+        return {key: value for key, value in write(self).items() if key != "tree" or self.tree.bodies}
 
     @field_validator("tendons")
     @classmethod
@@ -85,6 +84,7 @@ class FingerDescription(Description):
                     allowed = f"no such actuator or tendon; there are {', '.join(driven)}"
                     raise problem(f"tree.keyframes.{key}.inputs.{name}", allowed)
         check_actuators(self.actuators, self.actuated_names, self.passive_names)
+        check_tendon_couplings(self.couplings, self.actuated_names)
         for key, actuator in self.actuators.items():
             for name in actuator.tendons:
                 for entry in ("maximum_tension", "winch"):
@@ -241,6 +241,7 @@ class HandSettings(Description):
     )
     palm: Palm = Palm()
     fingers: dict[Name, PlacedFinger] = Field(min_length=1, description="Fingers by name.")
+    couplings: dict[Name, Coupling] = Field({}, description="By name, of tendons FINGER.TENDON.")
     fingers_touch: bool | None = Field(
         None,
         strict=True,
@@ -252,14 +253,15 @@ class HandSettings(Description):
     def _distinct(cls, value: dict[str, PlacedFinger]) -> dict[str, PlacedFinger]:
         folded: dict[str, str] = {}
         for name in value:
-            if name.casefold() in folded:
-                raise problem(name, f"another finger is called {folded[name.casefold()]}; names must differ in letters")
-            folded[name.casefold()] = name
+            if (other := folded.setdefault(name.casefold(), name)) != name:
+                raise problem(name, f"another finger is called {other}; names must differ in letters")
         return value
 
     @model_validator(mode="after")
     def _acting(self) -> Self:
         refuse_idle(self, OF_HAND)
+        tendons = [f"{name}.{own}" for name, placed in self.fingers.items() for own in placed.finger.actuated_names]
+        check_tendon_couplings(self.couplings, tendons)
         for name, placed in self.fingers.items() if self.palm.path else ():
             for joint in placed.finger.tree.on_paths:
                 entry = f"fingers.{name}.finger.tree.joints.{joint}.path"
@@ -281,6 +283,7 @@ class HandSettings(Description):
         """Return all fingers together: joints finger by finger; the actuated tendons of all, then the passive ones."""
         is_tree = any(placed.finger.tree.bodies for placed in self.fingers.values())
         joined = self._put_together().model_copy(update={"tree": self.bodies} if is_tree else None)
+        joined = joined.model_copy(update={"couplings": joined.couplings | self.couplings})
         joined._hand = self
         return joined
 

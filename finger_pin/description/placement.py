@@ -146,8 +146,10 @@ def scaled(finger: _Finger, scale: float) -> _Finger:
     tendons = {name: _scaled(tendon, scale) for name, tendon in tables.tendons.items()}
     friction, passive = _scaled(tables.joint_friction, scale), tables.passive_tendon
     passive = passive.updated(slack=_resized(passive.slack, scale, 1))
+    couplings = {name: each.updated(offset=scale * each.offset) for name, each in tables.couplings.items()}
     if not tree.bodies:
-        return finger.updated(joints=joints, tendons=tendons, joint_friction=friction, passive_tendon=passive)
+        grown = {"joint_friction": friction, "passive_tendon": passive, "couplings": couplings}
+        return finger.updated(joints=joints, tendons=tendons, **grown)
     for name in (slides := [name for name, joint in tree.joints.items() if joint.kind == "slide"]):
         spring = joints[name].spring
         joints[name] = joints[name].updated(
@@ -159,7 +161,7 @@ def scaled(finger: _Finger, scale: float) -> _Finger:
         lengths = {key: np.where(is_slide, 1.0, scale) * numbers[key] for key in ("coulomb", "stiction")}
         friction = friction.updated(**{key: tuple(each.tolist()) for key, each in lengths.items()})
     tree = _scaled_tree(tree, scale)
-    grown = {"joint_friction": friction, "passive_tendon": passive}
+    grown = {"joint_friction": friction, "passive_tendon": passive, "couplings": couplings}
     return finger.updated(joints=joints, tendons=tendons, tree=tree, **grown)
 
 
@@ -195,6 +197,11 @@ def joined_entries(hand: Any, parts: Mapping[str, Any]) -> dict[str, Any]:
             for group in ("tendon_friction", "joint_friction", "passive_tendon", "stroke_limiter")
         },
         "actuators": {name: _actuator_of_hand(name.split(".")[0], actuator) for name, actuator in actuators.items()},
+        "couplings": {
+            f"{name}.{own}": each.updated(tendon=f"{name}.{each.tendon}", other=each.other and f"{name}.{each.other}")
+            for name, part in parts.items()
+            for own, each in part.couplings.items()
+        },
         "touches_itself": any(part.touches_itself for part in parts.values()),
     }
 

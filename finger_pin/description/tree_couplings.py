@@ -1,13 +1,24 @@
-"""Couplings of a tree of bodies: joints, or tendons, that follow others."""
+"""Couplings: joints or tendons of a tree, or actuated tendons, that follow others."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from finger_pin.description.validation import Description, Name, Numbers, problem, quantity, real, reals, vector
+from finger_pin.description.validation import (
+    Description,
+    FullName,
+    Name,
+    Numbers,
+    problem,
+    quantity,
+    real,
+    reals,
+    suggestion,
+    vector,
+)
 
 #: The highest power of a coupling.
 MOST_POWER = 7
@@ -25,8 +36,8 @@ class Coupling(Description):
     """
 
     joint: Name | None = Field(None, description="The joint that follows.")
-    tendon: Name | None = Field(None, description="In place of joint: the tendon that follows.")
-    other: Name | None = Field(None, description="The joint or tendon that it follows; none: it is held.")
+    tendon: FullName | None = Field(None, description="In place of joint: the tendon that follows.")
+    other: FullName | None = Field(None, description="The joint or tendon that it follows; none: it is held.")
     ratio: Annotated[float, real(-1e3, 1e3)] = quantity(
         0.0, unit="1", source="design", doc="Angle of this joint per angle of the other; of tendons their lengths."
     )
@@ -89,3 +100,18 @@ def coupled(couplings: Mapping[str, Coupling], tendon: str | None) -> dict[str, 
     of_tendons = {name: each for name, each in couplings.items() if each.tendon is not None}
     pulling = {name: each for name, each in of_tendons.items() if tendon in (each.tendon, each.other)}
     return {name: -1.0 if each.tendon == tendon else each.ratio for name, each in pulling.items()}
+
+
+def check_tendon_couplings(couplings: Mapping[str, Coupling], actuated: Sequence[str]) -> None:
+    """Refuse couplings of joints, of tendons that nothing could pull, and with the name of a tendon."""
+    for name, coupling in couplings.items():
+        if coupling.joint is not None:
+            raise problem(
+                f"couplings.{name}.joint", "is for finger.tree.couplings; here tendons follow", coupling.joint
+            )
+        if name in actuated:
+            raise problem(f"couplings.{name}", "a tendon has this name; choose another")
+        for entry in ("tendon", "other"):
+            if (end := getattr(coupling, entry)) is not None and end not in actuated:
+                allowed = f"no such actuated tendon; there are {', '.join(actuated) or 'none'}"
+                raise problem(f"couplings.{name}.{entry}", allowed + suggestion(end, actuated), end)

@@ -104,6 +104,9 @@ def to_mjcf(
     description = describe(description.finger if isinstance(description, Scenario) else description)
     if timestep is not None and not timestep > 0.0:
         raise InputError("timestep", "must be above 0", timestep)
+    if description.couplings and (friction or description.tree.bodies):
+        allowed = "is not written beside friction=True, which counts a source's tension alone, or a tree"
+        raise InputError("couplings", allowed, next(iter(description.couplings)))
     if description.tree.bodies:
         if friction:
             call = "finger_pin.mujoco.add_friction(mujoco.MjSpec.from_string(text), of=hand)"
@@ -189,6 +192,12 @@ def _add_tendons(root: ET.Element, tendons: Tendons, massless: bool) -> None:
         distal = np.append(-routing.distal_coupling[index], 1.0)
         _add_tendon(table, f"{name}_proximal", coordinates, proximal, stiffness=stiffness, slack=0.5 * slack)
         _add_tendon(table, f"{name}_distal", coordinates, distal, stiffness=stiffness, slack=0.5 * slack)
+    # Both ways, at a length of its own.
+    for name, each in tendons.description.couplings.items():
+        arms = [routing.coupling[routing.tendons.index(end)] for end in (each.follower, each.other) if end]
+        arm = sum(factor * arm for factor, arm in zip((1.0, -each.slope), arms, strict=False))
+        spring = {"stiffness": each.stiffness, "damping": each.damping, "slack": -each.offset}
+        _add_tendon(table, name, routing.joints, arm, **spring, pulls_only=False)
 
 
 def _add_tendon(
@@ -199,11 +208,13 @@ def _add_tendon(
     damping: float = 0.0,
     stiffness: float = 0.0,
     slack: float = 0.0,
+    pulls_only: bool = True,
 ) -> None:
-    """Add a tendon; one with stiffness pulls at lengths above its slack."""
-    attributes = {"damping": _numbers(damping)} if stiffness == 0.0 else {"stiffness": _numbers(stiffness)}
+    """Add a tendon; one with stiffness pulls at lengths above its slack, and may push below."""
+    attributes = {"damping": _numbers(damping)} if damping or stiffness == 0.0 else {}
     if stiffness != 0.0:
-        attributes["springlength"] = _numbers(-_NO_LOWER_END, slack)
+        attributes["stiffness"] = _numbers(stiffness)
+        attributes["springlength"] = _numbers(-_NO_LOWER_END if pulls_only else slack, slack)
     tendon = ET.SubElement(table, "fixed", {"name": name, **attributes})
     for coordinate, factor in zip(coordinates, coupling, strict=True):
         if factor != 0.0:

@@ -34,8 +34,8 @@ from finger_pin.laws.bristle_slip import slip_level, slip_level_slopes, slip_ste
 from finger_pin.laws.law import Law, Row, direction, magnitude
 from finger_pin.typing import Number, Numbers, Numeric, Parameters
 
-# Force without a limit, N: more than any tendon bears.
-_UNLIMITED_FORCE = 1e30
+#: Force without a limit, N: more than any tendon bears.
+UNLIMITED_FORCE = 1e30
 # Shortest time constant for integrators, s: about a hundred times the resolution of time.
 _INSTANT = 1e-12
 
@@ -58,9 +58,9 @@ def capstan_slope(surface: Number, coefficient: Number) -> Number:
     return 0.5 * surface * (1.0 - coefficient * coefficient)
 
 
-def delivered_tension(command: Number, loss: Number) -> Number:
-    """Return f = max(0, f^a - f^f), N: a tendon cannot push."""
-    return np.maximum(0.0, command - loss)
+def delivered_tension(command: Number, loss: Number, least: Number = 0.0) -> Number:
+    """Return f = max(0, f^a - f^f), N: a tendon cannot push, unless another least tension is given."""
+    return np.maximum(least, command - loss)
 
 
 def _least_level_per_speed(stiffness: Number, viscous: Number) -> Number:
@@ -155,20 +155,20 @@ def _account(row: Row, rate: Number, coefficient: Number, level: Number, p: Para
 
 
 def _driven_value(row: Row, p: Parameters) -> Numbers:
-    acting = p[10]
-    pressing = delivered_tension(row.command, friction_force(row.state, row.speed, p[BRISTLE.viscous]))
+    acting, least = p[10:12]
+    pressing = delivered_tension(row.command, friction_force(row.state, row.speed, p[BRISTLE.viscous]), least)
     normal = np.abs(pressing) + np.abs(row.command)
     rate, loss, coefficient, sliding, level = _friction(row, normal, p)
-    force = delivered_tension(row.command, loss) - acting * row.command
+    force = delivered_tension(row.command, loss, least) - acting * row.command
     return force, rate, loss, normal, coefficient, sliding, level, pressing
 
 
 def _driven_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, Numbers]:
-    (_, _, _, viscous, _, _, _, _, _, _, acting), lag = p, micro_lag(row.state, p)
+    (_, _, _, viscous, _, _, _, _, _, _, acting, least), lag = p, micro_lag(row.state, p)
     loss, normal, coefficient, sliding, level, pressing = signals
     by_speed, by_stiction, by_normal, by_curvature, micro = _rate_slopes(row, normal, coefficient, sliding, level, p)
-    taut = 1.0 * (delivered_tension(row.command, loss) > 0.0)
-    pressed = by_normal * (pressing > 0.0)
+    taut = 1.0 * (delivered_tension(row.command, loss, least) > least)
+    pressed = by_normal * np.sign(pressing) * (pressing > least)
     by_command = pressed + by_normal * (1.0 - 2.0 * (row.command < 0.0))
     by_state = taut * (micro - 1.0)
     force = (0.0, -taut * viscous, by_state, -taut * lag, 0.0, taut - acting, 0.0)
@@ -176,10 +176,10 @@ def _driven_slopes(row: Row, p: Parameters, signals: Numbers) -> tuple[Numbers, 
 
 
 def _driven_account(row: Row, p: Parameters, force: Number, rate: Number, signals: Numbers) -> Numbers:
-    _, _, _, _, _, _, _, _, _, _, acting = p
+    acting, least = p[10:12]
     stored, coulomb, viscous, micro = _account(row, rate, signals[2], signals[4], p)
     # Only where a tension is cut, so that a wrong tension elsewhere shows in the residual.
-    slack = (row.command - signals[0]) * row.speed * (row.command <= signals[0])
+    slack = (row.command - signals[0] - least) * row.speed * (row.command - signals[0] <= least)
     return stored, (1.0 - acting) * row.command * row.speed, coulomb, viscous, micro, slack
 
 
@@ -202,10 +202,10 @@ def _passive_account(row: Row, p: Parameters, force: Number, rate: Number, signa
 _PARAMETERS = ("surface", "ratio", *BRISTLE._fields)
 
 #: A tendon that its input pulls through a canal. Where the input acts on the finger by itself, as an elastic tendon
-#: does, ``acting`` is 1 and the row exerts what friction changes of it; else 0.
+#: does, ``acting`` is 1 and the row exerts what friction changes of it; else 0. It delivers at least ``least``, N.
 DRIVEN_TENDON = Law(
     name="driven tendon (12), (14), (16)",
-    parameters=(*_PARAMETERS, "acting"),
+    parameters=(*_PARAMETERS, "acting", "least"),
     value=_driven_value,
     slopes=_driven_slopes,
     account=_driven_account,
@@ -232,7 +232,7 @@ PASSIVE_FRICTION = Law(
 
 def _canal_value(row: Row, p: Parameters) -> Numbers:
     # Lowest tension: tendons that cannot push end at zero.
-    lowest = -_UNLIMITED_FORCE * (p[10] <= 0.0)
+    lowest = -UNLIMITED_FORCE * (p[10] <= 0.0)
     tension = np.maximum(row.command, lowest)
     delivered = tension - friction_force(row.state, row.speed, p[BRISTLE.viscous])
     pressing = np.maximum(delivered, lowest)

@@ -22,6 +22,7 @@ from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows, state_scales
 from finger_pin.mechanism.servos import Actuators
 from finger_pin.mechanism.sheaths import in_sheaths
+from finger_pin.mechanism.sources import source_rows
 from finger_pin.mechanism.state import BLOCKS, Layout
 from finger_pin.mechanism.tendons import Tendons
 from finger_pin.mechanism.tree_mechanism import TreePaths, along_paths
@@ -107,7 +108,7 @@ def assemble(
     of_tree = {table.group: table.embed_coordinates(joints, width) for table in paths.tables}
     dry_friction = [of_tree.pop(group) for group in ("tendon_dry_friction",) if group in of_tree]
     custom_drives = [table for table in args.rows if table.pulls]
-    pulling = [*actuators.tendon_rows(width), *tendons.sources(width)]
+    pulling = [*actuators.tendon_rows(width), *source_rows(description, routing, width)]
     pulling, sheaths = in_sheaths(description, tendons.friction, pulling)
     drives = (*pulling, *sheaths[:2], *custom_drives)
     matrices = tendons.drive_matrices(drives)

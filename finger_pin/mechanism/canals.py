@@ -67,7 +67,9 @@ class Canals:
         cords = [self._cords(shares, rows)] if shares else []
         own, actuated = len(tendons.routing.tendons), tendons.routing.actuated
         pulls = [self._pull(name) for name in rubbing]
-        self._one_way = np.array([1.0] * own + [float(only_pulls) for _, only_pulls in pulls])
+        self._one_way = np.array(
+            [not any(each) for each in tendons.coupled] + [pulls_only for _, pulls_only in pulls], float
+        )
         canals = list(zip((*tendons.routing.tendons, *rubbing), range(own + len(pulls)), tendons.wraps, strict=True))
         # By table, weights of its rows in the tension of every canal, which wraps change.
         tension = {

@@ -16,6 +16,8 @@ from finger_pin.mechanism.rows import Energy, energy
 STATELESS, STATEFUL, MUSCLES = "actuator", "actuator_with_state", "muscle"
 #: The table of tendons that stretch and only pull.
 ELASTIC = "elastic_cords"
+#: The table of couplings of actuated tendons.
+TIES = "tendon_coupling"
 #: Tables of sources of tension that are rows: those with an end, and ideal winches.
 SOURCES_WITH_END, WINCHES = "tension_sources", "winches"
 #: The tables of cords, in the order of evaluation; those of further wraps have a number, from 2, at the end.
@@ -59,7 +61,7 @@ ACTUATORS = {
     STATEFUL: TreeTable(ACTUATOR_WITH_STATE, *_ACTUATORS),
     MUSCLES: TreeTable(MUSCLE, Energy("muscle_passive", "muscles' passive elements"), (Energy("muscles", "muscles"),)),
 }
-#: All tables of a tree's rows, by name.
+#: All tables of a tree's rows, and of couplings of actuated tendons, by name.
 TREE_TABLES = {
     "tendon_spring": TreeTable(DEAD_BAND_SPRING, *_TENDON_SPRINGS),
     ELASTIC: TreeTable(ELASTIC_TENDON, *_TENDON_SPRINGS),
@@ -68,6 +70,7 @@ TREE_TABLES = {
     ),
     "tendon_dry_friction": TreeTable(PIN_FRICTION, energy("tendon_dry_friction")),
     "coupling": TreeTable(JOINT_SPRING, Energy("coupling", "couplings"), (Energy("coupling_damping", "couplings"),)),
+    TIES: TreeTable(JOINT_SPRING, Energy("coupling", "couplings"), (Energy("coupling_damping", "couplings"),)),
     "loop": TreeTable(JOINT_SPRING, Energy("loop", "loops"), (Energy("loop_damping", "loops"),)),
     "gravity_compensation": TreeTable(CONSTANT_FORCE, Energy("gravity_compensation", "weights compensated")),
     **ACTUATORS,

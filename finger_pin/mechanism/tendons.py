@@ -14,13 +14,12 @@ from finger_pin.description.coupling import slack_lengths
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.friction import bristles
 from finger_pin.description.routing import Routing
-from finger_pin.laws.actuator import ACTUATOR
-from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION, capstan_coefficient
+from finger_pin.description.tree_couplings import coupled
+from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION, UNLIMITED_FORCE, capstan_coefficient
 from finger_pin.laws.spring import TENDON_HALF
-from finger_pin.mechanism.groups import SOURCES, SOURCES_WITH_END, TENDON_LOSSES, WINCHES
+from finger_pin.mechanism.groups import SOURCES, TENDON_LOSSES, TIES
 from finger_pin.mechanism.joints import OF_TENDONS, hysteresis_rows
 from finger_pin.mechanism.rows import Energy, Rows
-from finger_pin.mechanism.sheaths import WINCH_ENERGY
 from finger_pin.mechanism.wiring import drive_matrices
 from finger_pin.typing import Array, Number
 
@@ -132,6 +131,13 @@ class Tendons:
         values |= bristles(settings, numbers, losses) | {"drag": np.maximum(numbers["drag"], losses)}
         return np.array([values[name] for name in PASSIVE_FRICTION.parameters])
 
+    @cached_property
+    def coupled(self) -> Array:
+        """Weights of couplings in the tendons' tensions, shape (t, k): those that have any may push."""
+        couplings = self.description.couplings
+        shares = [[coupled(couplings, name).get(key, 0.0) for key in couplings] for name in self.routing.tendons]
+        return np.reshape(shares, (len(self.routing.tendons), len(couplings)))
+
     @property
     def at_bends(self) -> bool:
         """Return whether any tendon rubs at several places."""
@@ -169,9 +175,8 @@ class Tendons:
 
     def stretch(self, position: Array, passive_position: Array) -> tuple[Array, Array]:
         """Return the stretch of the proximal and distal halves, shapes (..., p), m; negative when slack."""
-        loose = 0.5 * self.slack
-        proximal = -position @ self.routing.proximal_coupling.T - passive_position - loose
-        distal = passive_position - position @ self.routing.distal_coupling.T - loose
+        proximal = -position @ self.routing.proximal_coupling.T - passive_position - 0.5 * self.slack
+        distal = passive_position - position @ self.routing.distal_coupling.T - 0.5 * self.slack
         return proximal, distal
 
     def rest_position(self, position: Array) -> Array:
@@ -185,35 +190,18 @@ class Tendons:
         shares = zip(self.routing.passive_names, self.hysteresis, strict=True)
         return tuple(f"{name}.{half}" for name, share in shares if share for half in _HALVES)
 
-    def sources(self, width: int) -> list[Rows]:
-        """Return the tables of ideal sources whose tension has an end, and of ideal winches, none without any."""
-        plain, winches, cords = {}, {}, self.description.drive_cords
-        for k, (name, tendon) in enumerate(self.description.tendons.items()):
-            most = tendon.maximum_tension
-            if tendon.winch is not None:
-                # T = max(0, K (w - l) - D l'), as a position actuator of MuJoCo that only pulls.
-                stiff, end = cords[name].stiffness, np.inf if most is None else most
-                winches[k] = [stiff, 0.0, -stiff, -cords[name].damping, -np.inf, np.inf, 0.0, end]
-            elif most is not None:
-                plain[k] = [1.0, 0.0, 0.0, 0.0, 0.0, most, 0.0, most]
-        tables = []
-        for group, numbers, supplied in ((SOURCES_WITH_END, plain, SOURCES), (WINCHES, winches, WINCH_ENERGY)):
-            if not numbers:
-                continue
-            places, arm = np.array(list(numbers), dtype=np.int64), np.zeros((len(numbers), width))
-            arm[:, : len(self.routing.joints)] = self.routing.coupling[places]
-            law, pulls = np.array(list(numbers.values())).T, tuple(self.routing.tendons[k] for k in places)
-            tables.append(Rows(group, ACTUATOR, pulls, law, arm, channels=places, powers=(supplied,), pulls=pulls))
-        return tables
-
     def drive_matrices(self, drives: Sequence[Rows]) -> dict[str, Array]:
         """Return the weights with which drives and halves' hysteresis pull the s strands, by table, shape (s, k)."""
         actuated, strands = self.routing.actuated, np.eye(len(self.routing.strand_coupling))
-        by_drives = drive_matrices(drives, self.routing.tendons[:actuated])
-        matrices = {group: strands[:, :actuated] @ weights for group, weights in by_drives.items()}
+        matrices = {group: strands[:, :actuated] @ weights for group, weights in self._pulls(drives).items()}
         if self.hysteretic_halves:
             matrices["passive_hysteresis"] = strands[:, actuated:][:, np.repeat(self.hysteresis > 0.0, 2)]
         return matrices
+
+    def _pulls(self, drives: Sequence[Rows]) -> dict[str, Array]:
+        """Return the weights with which drives and couplings pull the a actuated tendons, by table, shape (a, k)."""
+        weights = drive_matrices(drives, self.routing.tendons[: self.routing.actuated])
+        return weights | ({TIES: self.coupled[: self.routing.actuated]} if self.coupled.size else {})
 
     def _halves(self, motors: int) -> list[Rows]:
         """Return the tables of halves of passive tendons, (12), and of their hysteresis."""
@@ -231,8 +219,8 @@ class Tendons:
             offset=np.repeat(0.5 * self.slack, 2),
             stored=Energy("passive_tendon", "passive tendons"),
         )
-        shares = np.repeat(self.hysteresis, 2)
-        return [halves, *hysteresis_rows("passive_hysteresis", halves, shares, OF_TENDONS, _HYSTERESIS_ENERGY)]
+        held = np.repeat(self.hysteresis, 2), OF_TENDONS, _HYSTERESIS_ENERGY
+        return [halves, *hysteresis_rows("passive_hysteresis", halves, *held)]
 
     def rows(self, drives: Sequence[Rows] = (), motors: int = 0) -> list[Rows]:
         """Return the tables of halves (12), drives, driven and passive tendons (14), for (theta, p, theta_s, theta_m).
@@ -241,9 +229,8 @@ class Tendons:
             drives: Motors that pull tendons in place of ideal sources.
             motors: Number of motors and of spools with play.
         """
-        routing, joints = self.routing, len(self.routing.joints)
-        actuated, passive = routing.actuated, routing.passive
-        width = joints + passive + motors
+        routing, joints, passive = self.routing, len(self.routing.joints), self.routing.passive
+        actuated, width = routing.actuated, joints + passive + motors
         driven, bends = np.zeros((2, len(routing.tendons), width))
         # `Canals` has the wraps beyond the first ones.
         first = [places[0] for places in self.wraps[: len(routing.tendons)]]
@@ -252,11 +239,11 @@ class Tendons:
         bends[:, :joints] = routing.first_turns
         offset, names = np.array([wrap.offset for wrap in first]), routing.passive_names
         friction = self.at(range(len(first)), first)
-        wired = drive_matrices(drives, routing.tendons[:actuated])
+        wired = self._pulls(drives)
         replaced = np.any(np.hstack([np.zeros((actuated, 0)), *wired.values()]), axis=1)
-        halves = self._halves(motors)
+        least = np.where(self.coupled[:actuated].any(axis=1), -UNLIMITED_FORCE, 0.0)
         # What loads a canal is what its tendon's halves pull with, and what they hold.
-        both = np.repeat(np.eye(passive), 2, axis=1)
+        halves, both = self._halves(motors), np.repeat(np.eye(passive), 2, axis=1)
         loads = {table.group: both @ table.loads.get("passive_halves", np.eye(2 * passive)).T for table in halves}
         return [
             *halves,
@@ -265,7 +252,7 @@ class Tendons:
                 group="driven_tendons",
                 law=DRIVEN_TENDON,
                 names=routing.tendons[:actuated],
-                parameters=np.vstack([friction[:, :actuated], replaced]),
+                parameters=np.vstack([friction[:, :actuated], replaced, least]),
                 arm=driven[:actuated],
                 channels=np.where(replaced, -1, np.arange(actuated)),
                 inputs=wired,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from typing import Any
@@ -21,7 +21,7 @@ from finger_pin.description.tree_actuators import TreeActuator
 from finger_pin.description.tree_couplings import Coupling
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.bodies import place_bodies
-from finger_pin.mechanism.groups import ACTUATORS, ELASTIC, MUSCLES, STATEFUL, STATELESS, TREE_TABLES
+from finger_pin.mechanism.groups import ACTUATORS, ELASTIC, MUSCLES, STATEFUL, STATELESS, TIES, TREE_TABLES
 from finger_pin.mechanism.path_elements import PathElement, Paths, PathTerm, Place
 from finger_pin.mechanism.rigid_body import RigidBody
 from finger_pin.mechanism.rows import Rows
@@ -66,7 +66,8 @@ def _parts(description: FingerDescription) -> tuple[object, ...]:
     """Return the parts of a description that its tendons and the rows of its tree depend on."""
     couplings = description.tree.couplings.values()
     middles = (description.joints[each.other].range for each in couplings if each.other and any(each.higher))
-    return (place_bodies(description)[0], *routing_parts(description), *middles)
+    ties = description.couplings.values()
+    return (place_bodies(description)[0], *routing_parts(description), *middles, *ties)
 
 
 @memoised(_parts)
@@ -89,7 +90,7 @@ def along_paths(description: FingerDescription, paths: TendonPaths, table: Rows)
 
 
 def _tree_rows(description: FingerDescription, routes: TendonPaths) -> list[Rows]:
-    """Return the rows of a tree, without the friction of loaded tendons, for the coordinates of its joints."""
+    """Return the rows of a tree, without the friction of loaded tendons, and of all couplings, for its joints."""
     tree, width = description.tree, len(description.joints)
 
     def table(group: str, names: Iterable[str], numbers: _Numbers, along: tuple[Array, Paths], **further: Any) -> Rows:
@@ -102,7 +103,7 @@ def _tree_rows(description: FingerDescription, routes: TendonPaths) -> list[Rows
 
     described = (
         *_tendons(tree, routes),
-        _couplings(description, routes),
+        *(_couplings(group, description, routes) for group in ("coupling", TIES)),
         _loops(tree, routes),
         _weights(description, routes),
     )
@@ -163,22 +164,27 @@ def _tendons(tree: Tree, routes: TendonPaths) -> list[_Described]:
     ]
 
 
-def _couplings(description: FingerDescription, routes: TendonPaths) -> _Described:
+def _couplings(group: str, description: FingerDescription, routes: TendonPaths) -> _Described:
     """Return the springs that hold joints or tendons to others: each is a constraint q - f(q_other)."""
-    couplings, ends, numbers = description.tree.couplings, list[tuple[Array, Paths]](), list[Sequence[float]]()
+    couplings = description.couplings if group == TIES else description.tree.couplings
+    ends, numbers, starts = list[tuple[Array, Paths]](), list[Sequence[float]](), {**routes.reference_lengths}
+    cords: Mapping[str, Cord] = routes.cords
+    if group == TIES:
+        cords = routes.routing.cords
+        starts = {name: starts.get(tendon.along, 0.0) for name, tendon in description.tendons.items()}
     for each in couplings.values():
         names = (each.follower, *([each.other] if each.other else ()))
         factors, rest = (1.0, -each.slope)[: len(names)], each.offset
         if each.tendon:
-            rest += sum(factor * routes.reference_lengths[name] for factor, name in zip(factors, names, strict=True))
-        ends.append(routes.along((routes.cords[name] if each.tendon else _about(name) for name in names), factors))
+            rest += sum(factor * starts[name] for factor, name in zip(factors, names, strict=True))
+        ends.append(routes.along((cords[name] if each.tendon else _about(name) for name in names), factors))
         numbers.append((each.stiffness, rest, each.damping))
     arms = np.array([arm.sum(axis=0) for arm, _ in ends])
     paths = tuple(
         (*chain(*legs), *_higher_powers(description, routes, each))
         for (_, legs), each in zip(ends, couplings.values(), strict=True)
     )
-    return "coupling", couplings, numbers, (arms, paths)
+    return group, couplings, numbers, (arms, paths)
 
 
 def _higher_powers(description: FingerDescription, routes: TendonPaths, coupling: Coupling) -> tuple[PathTerm, ...]:

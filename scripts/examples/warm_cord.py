@@ -21,15 +21,15 @@ cold_value, cold_slopes, cold_account = DRIVEN_TENDON.value, DRIVEN_TENDON.slope
 
 def warm(row, p):
     """Return the numbers of a tendon with mu_e (1 - FALL T) in place of mu_e."""
-    mu, ratio, soft, viscous, stribeck, floor, exponent, lag, hardening, drag, acting, fall = p
+    mu, ratio, soft, viscous, stribeck, floor, exponent, lag, hardening, drag, acting, least, fall = p
     softer = mu * (1 - fall * row.reading)
-    return softer, ratio, soft, viscous, stribeck, floor, exponent, lag, hardening, drag, acting
+    return softer, ratio, soft, viscous, stribeck, floor, exponent, lag, hardening, drag, acting, least
 
 
 def slopes(row, p, signals):
     """Return those at this temperature, and by it: only mu_e phi counts, so that d/dmu_e is (phi / mu_e) d/dphi."""
     force, rate = cold_slopes(row, warm(row, p), signals)
-    return (*force, 0.0), (*rate, -rate[5] * row.curvature * p[11] / (1 - p[11] * row.reading))
+    return (*force, 0.0), (*rate, -rate[5] * row.curvature * p[12] / (1 - p[12] * row.reading))
 
 
 def heat(row, p):

@@ -27,7 +27,7 @@ def settled(law, p, speed, load=lambda t: 0.0, command=0.0, curvature=0.0, end=1
 def test_a_tendon_that_slides_evenly_delivers_the_capstan_law_less_its_drag(way):
     surface, turn, drag, pull = 0.0917, np.pi, 0.639, 12.0
     # No Stribeck excess, no viscous friction.
-    p = np.array([surface, 1.0, 5e4, 0.0, 0.01, 1e-4, 1.0, 0.0, 0.0, drag, 0.0])
+    p = np.array([surface, 1.0, 5e4, 0.0, 0.01, 1e-4, 1.0, 0.0, 0.0, drag, 0.0, 0.0])
     coefficient = np.tanh(surface * turn / 2.0)
     expected = pull * np.exp(-way * surface * turn) - way * drag / (1.0 + way * coefficient)
     assert settled(DRIVEN_TENDON, p, 0.05 * way, command=pull, curvature=turn) == pytest.approx(expected, rel=1e-7)
