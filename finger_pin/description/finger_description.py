@@ -135,7 +135,7 @@ class FingerDescription(Description):
             return self.tree.cord(tendon.along, curvature_offset=tendon.curvature_offset, at_bends=at_bends)
         return Cord.of_crossings(tendon, at_bends=at_bends)
 
-    @property
+    @cached_property
     def drive_cords(self) -> dict[str, DriveCord]:
         """The cords by which winches and spools of motors pull tendons, by tendon."""
         return drive_cords(self.tendons, self.actuators)

@@ -87,26 +87,14 @@ def evaluate_changed(period: PeriodArgs, state: Vector, column: int, rates: bool
     """Evaluate with one number of the state, or of what is held, changed; return the address of the model that has."""
     plain, step = unpack(period.plain, MODEL), period.steps[column]
     inputs, forces = plain.control.tension, plain.parameters.tip_force
-    if column < state.size:
-        value = state[column]
-        state[column] = value + step
-        evaluate_plain(period.plain, state, rates)
-        state[column] = value
-        return period.plain
-    column -= state.size
-    if column < inputs.size:
-        value = inputs[column]
-        inputs[column] = value + step
-        evaluate_plain(period.plain, state, rates)
-        inputs[column] = value
-        return period.plain
-    column -= inputs.size
-    if column < 3 * forces.shape[0]:
-        value = forces[column // 3, column % 3]
-        forces[column // 3, column % 3] = value + step
-        evaluate_plain(period.plain, state, rates)
-        forces[column // 3, column % 3] = value
-        return period.plain
-    address = period.varied[column - 3 * forces.shape[0]]
+    for numbers in (state, inputs, forces.reshape(-1)):
+        if column < numbers.size:
+            value = numbers[column]
+            numbers[column] = value + step
+            evaluate_plain(period.plain, state, rates)
+            numbers[column] = value
+            return period.plain
+        column -= numbers.size
+    address = period.varied[column]
     evaluate_plain(address, state, rates)
     return address
