@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import warnings
 from collections.abc import Callable
 
 import mujoco
@@ -17,7 +18,7 @@ import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.description.loading import read_scenario
-from finger_pin.exceptions import InputError
+from finger_pin.exceptions import InputError, PathJumpWarning
 from finger_pin.simulation.accuracy import residual_share
 
 #: Tolerances of runs that are compared, and of what may remain between them.
@@ -41,9 +42,11 @@ def compare(found: xr.Dataset, expected: xr.Dataset, names: Callable[[str], str]
 
 
 def account_closes(model: RandomModel) -> None:
-    """No energy appears or goes unaccounted for."""
-    share = residual_share(fp.simulate(tight(model.table)))
-    assert share < 1e-5, f"{share:.3g}"
+    """No energy appears or goes unaccounted for, unless a cord jumps, which is told."""
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        share = residual_share(fp.simulate(tight(model.table)))
+    assert share < 1e-5 or any(issubclass(each.category, PathJumpWarning) for each in told), f"{share:.3g}"
 
 
 def prepared_is_fresh(model: RandomModel) -> None:

@@ -15,8 +15,9 @@ from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.path_elements import PathElement, PathTerm, path_kinematics
 from finger_pin.typing import Array
 
-# Postures of a joint that are compared, steps of bisection between two of them, and the smallest jump, m.
-_POSTURES, _HALVINGS, _LEAST = 61, 36, 1e-5
+# Postures of a joint that are compared, steps of bisection between two of them, the smallest jump, m, and the part of
+# a joint's range beside a posture that counts, too.
+_POSTURES, _HALVINGS, _LEAST, _BESIDE = 61, 36, 1e-5, 0.02
 
 
 class PathJump(NamedTuple):
@@ -42,7 +43,7 @@ class PathJump(NamedTuple):
 
 
 def path_jumps(finger: FingerLike, position: Sequence[float] | Array) -> tuple[PathJump, ...]:
-    """Return the jumps of wrapped paths within the range of every joint, the others as in a posture.
+    """Return the jumps of wrapped paths over the range of every joint and about a posture, the others as there.
 
     A length that is smooth changes by its arm: where it does not between two postures, and neither does in ever
     smaller parts of that way, it jumps. Of every wrap and joint the largest is found, of at least 0.01 mm.
@@ -71,7 +72,9 @@ def _jumps(finger: Finger, theta: Array) -> tuple[PathJump, ...]:
             kinematics = path_kinematics(finger.rigid_body, q, legs, len(q))
             return np.stack([kinematics.length, kinematics.arm[:, index]], axis=-1)
 
-        angles = np.linspace(*joint.range, _POSTURES)
+        # A joint may lie beyond its range, and stop a little before a jump there.
+        beside = theta[index] + _BESIDE * np.ptp(joint.range) * np.array([-1.0, 1.0])
+        angles = np.linspace(min(*joint.range, *beside), max(*joint.range, *beside), _POSTURES)
         if not np.any([along(angle)[:, 1] for angle in (angles[0], theta[index], angles[-1])]):
             continue
         curves = np.array([along(angle) for angle in angles])

@@ -86,11 +86,11 @@ def identify(
         stop: Asked now and then; when it returns true the best so far is returned, attribute ``unfinished``.
 
     Returns:
-        Along ``parameter``: ``estimate``, ``lower`` and ``upper`` at 95 %, infinite where open, ``determined``,
-        ``units``, ``correlation``, profiles; along ``signal`` noise and correlation; along ``sample`` what was measured
-        and the residuals; along ``law`` what `compare` found; along ``prediction`` and ``predicted`` what `predict`
-        returns of what is held out. Attribute ``undetermined``: what the recordings leave
-        open, in words.
+        Recordings in order of their names. Along ``parameter``: ``estimate``, ``lower`` and ``upper`` at 95 %,
+        infinite where open, ``determined``, ``units``, ``correlation``, profiles; along ``signal`` noise and
+        correlation; along ``sample`` what was measured and the residuals; along ``law`` what `compare` found; along
+        ``prediction`` and ``predicted`` what `predict` returns of what is held out. Attribute ``undetermined``: what
+        the recordings leave open, in words.
 
     Raises:
         InputError: If the table or a recording is wrong, there are fewer readings than parameters, or a parameter is
@@ -102,6 +102,10 @@ def identify(
     tables = {"parameters": parameters, "recordings": recordings, "compare": compare}
     entries = {name: {key: _as_builtin(each) for key, each in table.items()} for name, table in tables.items() if table}
     scenario, settings = load_bench(bench, overrides, entries)
+    asked = list(settings.bounds)
+    # In one order, so that sums and random starts, and so all numbers, are the same in whichever order they were given.
+    in_order = {name: dict(sorted(getattr(settings, name).items())) for name in ("parameters", "recordings")}
+    settings = settings.model_copy(update=in_order)
     custom_finger = resolve_finger(finger, scenario)
     scenario = with_finger(scenario, custom_finger)
     recorded = [read_recording(name, each, (data or {}).get(name)) for name, each in settings.recordings.items()]
@@ -117,7 +121,7 @@ def identify(
     with Checkpoint(None if output is None else Path(output), request, restart) as checkpoint:
         pipeline = FitPipeline(objective, checkpoint, loss, progress)
         unfinished = pipeline.run(settings, starts, seed, profiles, refits)
-        result = result_dataset(pipeline, unfinished)
+        result = result_dataset(pipeline, unfinished).sel(parameter=asked, other=asked)
         result.attrs["ringing"] = _ringing(residuals, pipeline.best.z)
         result.attrs["profiles"], result.attrs["refits"] = int(profiles), int(refits)
         result.attrs["custom_finger"] = int(custom_finger is not None)

@@ -234,7 +234,7 @@ def write_results(result: xr.Dataset, folder: Path, bench: ScenarioLike, functio
     """
     save(result, folder / "identification.nc")
     recordings = ", ".join(dict.fromkeys(signal.recording for signal in function.signals))
-    keys = function.parameters.bounds
+    keys = result["parameter"].values.tolist()
     single = all(recording_pattern(key) is not None or not {*"*{[&"} & {*key} for key in keys)
     extended = single and not isinstance(bench, Scenario) and load_scenario(bench) == function.scenario
     lines = ["# What an identification has found; intervals at 95 %."]
