@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 from finger_pin.analysis.path_jumps import path_jump_advice
 from finger_pin.control.closed_loop import ClosedLoop
 from finger_pin.control.position_drive import LoopMemory
-from finger_pin.description.validation import finite_vector
+from finger_pin.core.stepping.stepper import TABLEAUS
+from finger_pin.description.validation import finite_vector, suggestion
 from finger_pin.exceptions import InputError, StartWarning
 from finger_pin.laws.limiter import limiter_energy, penetration
 from finger_pin.mechanism.finger import Finger
@@ -154,6 +155,17 @@ def check_motors(finger: Finger, x: Array, name: str = "initial") -> None:
         if abs(motor_speed) > greatest:
             allowed = f"motor {motor} must turn by at most {greatest:.4g} rad/s at its spool, which its supply can hold"
             raise InputError(name, allowed, float(motor_speed))
+
+
+def check_settings(table: str, method: str, rtol: float, atol_scale: float) -> None:
+    """Refuse methods that do not step, and tolerances that no step can keep; `table` is what entries begin with."""
+    if method not in TABLEAUS:
+        raise InputError(
+            f"{table}method", f"must be one of {', '.join(TABLEAUS)}{suggestion(method, TABLEAUS)}", method
+        )
+    for name, value in (("rtol", rtol), ("atol_scale", atol_scale)):
+        if not 0.0 < value <= 0.1:
+            raise InputError(f"{table}{name}", "must be above 0 and at most 0.1", value)
 
 
 def beyond_ranges(finger: Finger, x: Array) -> str:

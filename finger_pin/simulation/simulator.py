@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,11 +14,10 @@ from finger_pin.control.inputs import Inputs
 from finger_pin.control.palm import start_state
 from finger_pin.control.stepped_drives import SteppedGoals
 from finger_pin.control.user_controllers import Samples
-from finger_pin.core.stepping.stepper import TABLEAUS, Stepper
+from finger_pin.core.stepping.stepper import Stepper
 from finger_pin.description.demo_motion import start_position
 from finger_pin.description.loading import ParametrisedScenario, ScenarioLike, load_scenario
 from finger_pin.description.scenario import Scenario
-from finger_pin.description.validation import suggestion
 from finger_pin.exceptions import InputError, IntegrationError
 from finger_pin.mechanism.coerce import FingerLike, as_finger, resolve_finger, with_finger, with_parameters_of
 from finger_pin.mechanism.finger import Finger
@@ -26,7 +25,13 @@ from finger_pin.mechanism.signals import FingerSignals
 from finger_pin.mechanism.state import State
 from finger_pin.references.reference import Reference
 from finger_pin.simulation.held_inputs import HeldInputs
-from finger_pin.simulation.initial_state import as_finite_array, check_motors, failure_advice, warn_beyond_ranges
+from finger_pin.simulation.initial_state import (
+    as_finite_array,
+    check_motors,
+    check_settings,
+    failure_advice,
+    warn_beyond_ranges,
+)
 from finger_pin.simulation.step_log import StepLog, stepped_scenario
 from finger_pin.typing import Array
 
@@ -68,10 +73,7 @@ class Simulator:
         Raises:
             InputError: Naming the argument that is wrong, or bodies that start deep in each other.
         """
-        _check_method("method", method)
-        for name, value in (("rtol", rtol), ("atol_scale", atol_scale)):
-            if not 0.0 < value <= 0.1:
-                raise InputError(name, "must be above 0 and at most 0.1", value)
+        check_settings("", method, rtol, atol_scale)
         settings, made = {"method": method, "rtol": float(rtol), "atol_scale": float(atol_scale)}, as_finger(finger)
         first = np.array([*start_position(made.description).values()])
         posture = first if position is None else as_finite_array("position", position, first.shape)
@@ -90,14 +92,12 @@ class Simulator:
             finger: Replaces the finger that the scenario describes, as for `simulate`.
             goals: Whether the loops of motors in position drive run: inputs are then angles of spools that they hold,
                 rad, from their next sample on, in place of voltages.
-
-        Raises:
-            InputError: Naming the entry that is wrong.
         """
         loaded = load_scenario(scenario)
         custom = resolve_finger(finger, loaded)
         loaded = with_finger(loaded, custom)
-        _check_method("simulation.method", loaded.simulation.method)
+        settings = loaded.simulation
+        check_settings("simulation.", settings.method, settings.rtol, settings.atol_scale)
         simulator = object.__new__(cls)
         simulator._set_up(custom or Finger(loaded.finger, objects=loaded.environment.objects), loaded, None, goals)
         return simulator
@@ -152,9 +152,6 @@ class Simulator:
 
         Args:
             initial: The packed state, the state by name, or theta, shape (n,), rad, at rest; by default the first one.
-
-        Raises:
-            InputError: If it has another size, a number is not finite, or a motor turns too fast; nothing changed.
         """
         if isinstance(initial, State):
             initial = self.finger.layout.pack(initial)
@@ -175,10 +172,7 @@ class Simulator:
 
         Args:
             values: By dotted key, as of `load_scenario`, such as ``{"finger.tendon_friction.coulomb": 0.1}``; where the
-                simulator was not made of a scenario, of the finger or hand alone.
-
-        Raises:
-            InputError: Naming the entry that is wrong, or if the finger had another state; nothing changed.
+                simulator was not made of a scenario, of the finger or hand alone. The state must stay what it is.
         """
         keys, alone = tuple(values), self._posture is not None
         if self._family is None or self._family.keys != keys:
@@ -208,9 +202,20 @@ class Simulator:
 
     @x.setter
     def x(self, value: ArrayLike) -> None:
+        self._go_on(value, self._stepper.restart)
+
+    def correct(self, x: ArrayLike) -> None:
+        """Go on from a state near the present one, shape (size,), as a measurement corrects it, with a new result.
+
+        Steps stay as long as they are; setting `x` begins with short ones, with the same bits whatever was before.
+        """
+        self._go_on(x, self._stepper.correct)
+
+    def _go_on(self, value: ArrayLike, start: Callable[[Array], None]) -> None:
+        """Start the stepper from a state at the present time."""
         x = as_finite_array("x", value, (self.finger.layout.size,))
         check_motors(self.finger, x, "x")
-        self._stepper.restart(x)
+        start(x)
         self._log = StepLog(self._stepper, self._held.goals)
 
     @property
@@ -293,8 +298,3 @@ class Simulator:
         return copy
 
     __copy__ = clone  # Simulators that share a stepper would step each other.
-
-
-def _check_method(entry: str, method: str) -> None:
-    if method not in TABLEAUS:
-        raise InputError(entry, f"must be one of {', '.join(TABLEAUS)}{suggestion(method, TABLEAUS)}", method)

@@ -75,6 +75,22 @@ def test_a_state_put_back_is_where_the_motion_goes_on_from(finger: fp.Finger) ->
     np.testing.assert_allclose(walk(simulator, 10, seed=2), ahead, atol=1e-7)
 
 
+def test_a_corrected_state_moves_as_one_that_is_set_in_fewer_steps(finger: fp.Finger) -> None:
+    noise, ends, steps = 1e-6 * np.random.default_rng(4).normal(size=(20, finger.layout.size)), [], []
+    for go_on in (Simulator.correct, lambda simulator, x: setattr(simulator, "x", x)):
+        simulator = Simulator(finger, START, rtol=1e-3, atol_scale=1e-3)
+        for change in noise * finger.layout.scales():
+            simulator.step(TENSION, 1e-3)
+            go_on(simulator, simulator.x + change)
+        ends.append(simulator.x / finger.layout.scales())
+        steps.append(sum(float(part.memory.accepted_steps[0]) for part in simulator._stepper.parts))
+    np.testing.assert_allclose(*ends, atol=1e-3)
+    # Steps that begin with 1 us and grow at most sixfold are four more before they are 1 ms long.
+    assert steps[1] - steps[0] > 3 * len(noise)
+    with pytest.raises(fp.InputError, match=r"x = .*must be finite"):
+        simulator.correct(np.full(finger.layout.size, np.nan))
+
+
 def test_changing_what_is_returned_changes_nothing_inside(finger: fp.Finger) -> None:
     simulator = Simulator(finger, START)
     state = simulator.step(TENSION, 1e-3)

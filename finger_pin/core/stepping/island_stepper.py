@@ -143,10 +143,8 @@ class IslandIntegrator:
         place_all(structure, parameters, attitude)
         self.structure, self.parameters, self.control, self.tableau = structure, parameters, control, tableau
         self.x, self.attitude, self.atol, self.memory = x, attitude, atol, self._bound.memory
-        self._memory = memory
-        self._nothing, self._record_range = self.room(0), np.zeros(2, dtype=np.int64)
-        # A record, loops, knots and steps that compiled code was given last; and the blocks that hold them, what they
-        # are for last.
+        self._memory, self._nothing, self._record_range = memory, self.room(0), np.zeros(2, dtype=np.int64)
+        # What compiled code was given last, and the blocks that hold it.
         self._placed: tuple[Record | None, Drives | None, Array, Steps | None] = (None, None, self.knots, None)
         self._blocks: list[Block] = []
         self._advance = advance
@@ -162,9 +160,8 @@ class IslandIntegrator:
 
     def room(self, count: int) -> Record:
         """Return a buffer for m steps."""
-        return Record.from_sizes(
-            count, len(self.x), len(self.attitude), len(self.tableau.dense), len(self._bound.kinks)
-        )
+        bound = self._bound
+        return Record.from_sizes(count, len(self.x), len(self.attitude), len(bound.dense), len(bound.kinks))
 
     @property
     def rtol(self) -> float:
@@ -212,13 +209,10 @@ class IslandIntegrator:
 
     def restart(self, x: Array, attitude: Array, time: float | None = None) -> None:
         """Continue from another state, at the same time or another one, s, with no memory of earlier steps."""
-        self.x[:], self.attitude[:] = x, attitude
-        self.forget()
-        place_all(self.structure, self.parameters, self.attitude)
+        self.correct(x, attitude)
         memory = self.memory
-        for entry in (memory.last_step_size, memory.last_error, memory.rejected, memory.limiting_state):
+        for entry in (memory.rejected, memory.limiting_state, memory.held_step_size, memory.continued):
             entry[0] = 0.0
-        memory.held_step_size[0] = memory.continued[0] = 0.0
         memory.step_size[0] = FIRST_STEP
         if time is not None:
             # Steps are counted from here on, for those that creep.
@@ -226,8 +220,16 @@ class IslandIntegrator:
             if self.drives is not None:
                 self.drives.sample_count[0] = math.ceil((time - self.drives.first) / self.drives.period * (1.0 - 1e-12))
 
+    def correct(self, x: Array, attitude: Array) -> None:
+        """Continue from a state near the present one, with steps as long as they are."""
+        self.x[:], self.attitude[:] = x, attitude
+        self.forget()
+        place_all(self.structure, self.parameters, self.attitude)
+        # The trend of errors is that of the motion before.
+        self.memory.last_step_size[0] = self.memory.last_error[0] = 0.0
+
     def forget(self) -> None:
-        """Activate all contact pairs, as for a new state."""
+        """Activate all contact pairs."""
         if self.structure.contact_rows:
             activate_contacts(self._block.address)
 

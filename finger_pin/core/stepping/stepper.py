@@ -27,7 +27,6 @@ from finger_pin.typing import Array
 
 #: Snapshot of every island: tip-force flag, drive loops, knots, state arrays.
 Snapshot = list[tuple[bool, Drives | None, Array, tuple[Array, ...]]]
-
 TABLEAUS: dict[str, Callable[[], Tableau]] = {"Rodas5P": rodas5p, "Rodas4": rodas4}
 
 
@@ -147,15 +146,15 @@ class Stepper:
             reused: A stepper that is not needed any more: it is returned, if its finger differs in numbers only.
             evaluator: If it is one of the same mechanism, its structure and parameters are taken.
         """
-        atol = atol_scale * finger.layout.scales()
-        args = StepperArgs(finger.mechanism, control, x, TABLEAUS[method](), rtol, atol, force)
+        tableau, atol = TABLEAUS[method](), atol_scale * finger.layout.scales()
+        args = StepperArgs(finger.mechanism, control, x, tableau, rtol, atol, force)
         compiled = None
         if isinstance(evaluator, CompiledFinger) and evaluator.finger is finger:
             compiled = evaluator.mechanism.structure, evaluator.mechanism.parameters
         return reused if reused is not None and reused.rebind(args, compiled) else cls(*args, compiled)
 
     def _places(self, island: Island) -> NDArray[np.int64]:
-        """Return the indices of an island's numbers in the whole state."""
+        """Return places in the whole state."""
         return np.concatenate([island.coordinates, self._width + island.coordinates, 2 * self._width + island.states])
 
     def places(self, island: Island) -> NDArray[np.int64]:
@@ -196,9 +195,19 @@ class Stepper:
 
     def restart(self, x: Array, time: float | None = None) -> None:
         """Continue from another state, at the same time or another one, s, with no memory of earlier steps."""
+        for part, numbers, attitude in self._divided(x):
+            part.restart(numbers, attitude, time)
+
+    def correct(self, x: Array) -> None:
+        """Continue from a state near the present one, with steps as long as they are."""
+        for part, numbers, attitude in self._divided(x):
+            part.correct(numbers, attitude)
+
+    def _divided(self, x: Array) -> Iterator[tuple[IslandIntegrator, Array, Array]]:
+        """Yield islands with their numbers of a packed state, and quaternions."""
         start, attitude = self._charts.to_core(np.asarray(x, dtype=float))
         for part, free in zip(self.parts, self._free, strict=True):
-            part.restart(start[self._places(part.island)], attitude[free], time)
+            yield part, start[self._places(part.island)], attitude[free]
 
     def drive(self, drives: Drives) -> None:
         """Run loops of motors from now on, each in the island of its rotor; memory is shared."""
