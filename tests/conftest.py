@@ -101,6 +101,14 @@ def reversals():
     return fp.simulate(fp.load_scenario("reversals"))
 
 
+@pytest.fixture(scope="module")
+def coarse_sections():
+    """Sections of forces in few directions, each of which is a linear programme or more."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("finger_pin.views.plots.fingertip_forces._DIRECTIONS", 12)
+        yield
+
+
 @pytest.fixture
 def kernel(monkeypatch):
     """A notebook's kernel that runs the test, as IPython tells of it."""
@@ -159,6 +167,8 @@ def browser(tmp_path_factory):
         "disable-sync",
         "no-first-run",
         "window-size=1200,800",
+        # Half of the pixels each way: pictures are painted by the processor.
+        "force-device-scale-factor=0.5",
         f"user-data-dir={tmp_path_factory.mktemp('chromium')}",
     ):
         options.add_argument(f"--{argument}")

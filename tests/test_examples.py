@@ -163,9 +163,10 @@ def test_what_is_trained_with_one_friction_fails_with_others_also_in_c_with_the_
 def test_a_sweep_on_dask_is_that_of_threads(example):
     pytest.importorskip("distributed")
     names = example("sweep_on_dask")
-    short = {"simulation.duration": 1.0}
-    expected = fp.sweep("reversals", names["OVER"], metrics=["tracking_rms", "tension_peak"], overrides=short)
-    assert names["study"].identical(expected)
+    corners, metrics = {key: values[::3] for key, values in names["OVER"].items()}, ["tracking_rms", "tension_peak"]
+    expected = fp.sweep("reversals", corners, metrics=metrics, overrides={"simulation.duration": 1.0})
+    for name in metrics:
+        np.testing.assert_array_equal(names["study"].sel(corners)[name], expected[name])
 
 
 def test_a_killed_sweep_goes_on_and_is_that_of_one_that_was_not(example):

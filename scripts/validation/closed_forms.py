@@ -78,7 +78,7 @@ class Slide:
 
 def slide(finger: Finger, velocity: float, travel: float = 2e-3, stiction: float = 0.0) -> Slide:
     """Let the first tendon slide under the command, by the compiled rates; the classic method of order 4."""
-    core, steps = CompiledFinger(finger), 1500
+    core, steps = CompiledFinger(finger), 700
     x = finger.rest_state(np.zeros(1))
     x[1], x[2] = velocity / RADIUS, stiction
     tension = np.array([COMMAND, COMMAND])

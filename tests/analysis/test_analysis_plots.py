@@ -10,6 +10,8 @@ from finger_pin.analysis import critical_friction, force_polytope, self_locking_
 from finger_pin.views.plots.critical_friction import plot_critical_friction, plot_runaway, plot_self_locking_map
 from finger_pin.views.plots.fingertip_forces import plot_force_polytope, plot_radius_sensitivity
 
+pytestmark = pytest.mark.usefixtures("coarse_sections")
+
 POSTURE = (0.1, 0.5, 0.6, 0.42)
 
 

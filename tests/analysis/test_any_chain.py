@@ -108,6 +108,7 @@ def still(finger, samples=3):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("coarse_sections")
 @pytest.mark.parametrize("joints", [1, 4])
 @settings(FEW, max_examples=1)
 @given(data=st.data())

@@ -109,6 +109,7 @@ def test_self_locking_prints_every_number_with_its_conditions_and_draws_three_fi
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("coarse_sections")
 @pytest.mark.parametrize(("name", "arguments"), [("conclusions", ("--only", "a", "--quiet")), ("force_capability", ())])
 def test_a_folder_that_cannot_be_made_is_refused_in_one_line(run, tmp_path, name, arguments):
     (tmp_path / "file").write_text("")

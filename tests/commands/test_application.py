@@ -213,6 +213,7 @@ def test_an_argument_that_would_be_ignored_is_refused_in_one_line(name, argument
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("coarse_sections")
 def test_the_force_script_takes_a_scenario_a_file_that_extends_one_and_their_finger_alike(
     capsys, tmp_path, monkeypatch
 ):

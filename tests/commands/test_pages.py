@@ -31,7 +31,7 @@ PAGES = [ROOT / "README.md", ROOT / "finger_pin" / "QUESTIONS.md", *sorted(ROOT.
 LINKED = [*PAGES, *sorted(set(ROOT.glob("[fst]*/**/*.md")) - set(PAGES))]
 DURATION = 0.02
 SHORTER = {
-    r"(--method Radau) --duration \S+": r"\1 --duration=0.004",
+    r"(--method Radau) --duration \S+": r"\1 --duration=0.001",
     r"--duration \S+": f"--duration {DURATION}",
     r":7\b": ":2",
     r":6:log": ":2:log",
@@ -45,13 +45,13 @@ SHORTER = {
     r"conclusions\.py( reversals)?$": "conclusions.py reversals --only a",
     r"reaction\.py$": "reaction.py reversals --forces 1",
     # What it finds has a test of its own.
-    r"(identify\.py) (winding|servo_pendulum|postures|spool_finger|instrument|second_instrument).*": r"\1 --list any",
+    r"(identify\.py) (?!transmission|fig6|bench).*": r"\1 --list any",
     # It fits benches under every law.
     r"(compare_laws\.py).*": r"\1 transmission",
     # It fits for minutes.
     r"(servo_models\.py).*": r"\1 --only M1 --generations 0",
-    # What it prints has a test of its own.
-    r"(validate\.py) --observer.*": r"\1 --help",
+    # What they print has tests of its own.
+    r"(validate\.py) --(observer|random).*": r"\1 --help",
     # Its stages have tests of their own, and it measures for minutes.
     r"(benchmark\.py).*": r"\1 --help",
     # They train for minutes, with a library that tests do without.
@@ -98,6 +98,7 @@ def shown(tmp_path_factory):
         patch.setattr("finger_pin.views.viewer.page_server.PageHandle.wait", lambda viewing: viewing.close())
         patch.setattr("finger_pin.views.playground.player.Playground.wait", lambda playing: playing.close())
         patch.setattr("finger_pin.views.plots.figure_files.save_figure", not_painted)
+        patch.setattr("finger_pin.views.plots.fingertip_forces._DIRECTIONS", 12)
         # The comparison of controllers leaves out the start.
         patch.setattr("paper.comparison.SETTLED", 0.0)
         meshcat = importlib.import_module("meshcat")

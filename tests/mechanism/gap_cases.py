@@ -1,10 +1,9 @@
 """Random pairs of a body's part and another body, and gaps of many pairs at once."""
 
 import coal
-import numba
 import numpy as np
+from compiled_shapes import fill_rows
 
-from finger_pin.core.jit import inlined
 from finger_pin.mechanism.gaps import ELLIPSOIDS, PRISM, prism_parameters
 
 #: Kinds of parts: whether they have a disc, and a length.
@@ -13,27 +12,14 @@ PARTS = {"point": (0.0, 0.0), "segment": (0.0, 1.0), "disc": (1.0, 0.0), "cylind
 EPSILON = 1e-5 / 4.0
 
 
-def filler(shape):
-    """Return a function that fills the gap of many pairs, shape (m, 13), and its slopes, shape (m, 78)."""
-    value_of, slopes_of = inlined(shape.value), inlined(shape.slopes)
-
-    @numba.njit
-    def fill(y, p, found, slopes):
-        for k in range(y.shape[0]):
-            value_of(y[k], p[k], found[k])
-            slopes_of(y[k], p[k], slopes[k])
-
-    return fill
-
-
 #: By the count of their parameters.
-FILL = {len(shape.parameters): filler(shape) for shape in (PRISM, ELLIPSOIDS)}
+SHAPE = {len(shape.parameters): shape for shape in (PRISM, ELLIPSOIDS)}
 
 
 def gaps(y, p):
     """Return distances and the rest, (m, 13), slopes of the rest, (m, 12, 6), and of the distance, (m, 6)."""
-    found, slopes = np.empty((len(y), 13)), np.empty((len(y), 78))
-    FILL[p.shape[1]](y, p, found, slopes)
+    shape = SHAPE[p.shape[1]]
+    found, slopes = fill_rows(shape.value, 13, y, p), fill_rows(shape.slopes, 78, y, p)
     return found, slopes[:, :72].reshape(-1, 12, 6), slopes[:, 72:]
 
 

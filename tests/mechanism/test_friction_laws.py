@@ -6,8 +6,11 @@ import sys
 
 import numpy as np
 import pytest
+from core_cases import relative
+from random_mechanisms import kinds_of
 
 import finger_pin as fp
+from finger_pin.core.signals.compiled_finger import CompiledMechanism
 from finger_pin.description.loading import read_scenario
 from finger_pin.views.summary import summarize
 from finger_pin.views.viewer import write_animation
@@ -95,10 +98,15 @@ def test_below_its_level_coulomb_friction_creeps_where_bristles_hold():
 @pytest.mark.slow
 def test_the_compiled_and_the_readable_path_agree_on_every_law(own):
     drag = {"drag": 2e-3, "drag_asymmetry": 0.4}
+    rng, command = np.random.default_rng(1), np.full(4, 5.0)
     for law, more in (("lugre", drag), ("dahl", drag), ("coulomb", drag), ("laws_of_mine:SOFT", {})):
-        given = scenario(law, **more).updated(simulation={"duration": 0.04})
-        both = [fp.simulate(given.updated(simulation={"method": method})) for method in ("Rodas5P", "BDF")]
-        np.testing.assert_allclose(*(each.joint_position.values for each in both), atol=2e-5)
+        finger = fp.Finger(scenario(law, **more).finger)
+        spread = 0.3 * rng.normal(size=(20, finger.layout.size)) * finger.layout.scales()
+        x = finger.rest_state(np.full(4, 0.4)) + spread
+        readable = finger.mechanism.evaluate(x, command).rate
+        compiled = CompiledMechanism(finger.mechanism).evaluate(x, command).rate
+        for kind in kinds_of(finger.mechanism):
+            assert relative(compiled[:, kind], readable[:, kind]) < 1e-11
 
 
 def test_a_user_s_law_acts_and_has_its_own_entry_in_the_account(own):

@@ -94,9 +94,9 @@ def motion(finger):
         return np.append(signals.rate, powers(signals).net)
 
     start = np.append(finger.rest_state(desired(0.0)), 0.0)
-    scales = 1e-6 * np.append(finger.layout.scales(), 1e-3)
+    scales = 1e-5 * np.append(finger.layout.scales(), 1e-3)
     times = np.linspace(0.0, 0.5, 51)
-    solution = solve_ivp(rates, (0.0, 0.5), start, method="BDF", rtol=1e-6, atol=scales, t_eval=times)
+    solution = solve_ivp(rates, (0.0, 0.5), start, method="BDF", rtol=1e-5, atol=scales, t_eval=times)
     assert solution.success
     return times, solution.y[:-1].T, solution.y[-1]
 

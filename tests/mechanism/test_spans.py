@@ -1,14 +1,12 @@
 """Length, turn, pull and slopes of spans: against MuJoCo, against closed forms and differences, and compiled."""
 
 import math
-from functools import cache
 
 import mujoco
-import numba
 import numpy as np
 import pytest
+from compiled_shapes import fill_rows
 
-from finger_pin.core.jit import inlined
 from finger_pin.mechanism.spans import CYLINDER, SPHERE, STRAIGHT
 
 RADIUS = 0.1
@@ -143,26 +141,13 @@ def test_points_in_line_with_the_centre_have_a_path(span):
     assert np.isfinite(slopes(span, y, numbers("inside"))[1]).all()
 
 
-@cache
-def compiled(span):
-    """Return a compiled function that fills the value of a span and its slopes."""
-    compiled_value, compiled_slopes = inlined(span.value), inlined(span.slopes)
-
-    @numba.njit(error_model="numpy")
-    def both(y, p, out, slopes):
-        compiled_value(y, p, out)
-        compiled_slopes(y, p, slopes)
-
-    return both
-
-
 @pytest.mark.slow
 @every_case
 def test_compiled_spans_agree(span, side):
-    p, both = numbers(side), compiled(span)
-    for y in postures(span, p, 20):
-        out, found = np.zeros(8), np.zeros(42)
-        both(y, p, out, found)
+    p, rows = numbers(side), np.array([*postures(span, numbers(side), 20)])
+    many = np.tile(np.array(p, float), (len(rows), 1))
+    filled = fill_rows(span.value, 8, rows, many), fill_rows(span.slopes, 42, rows, many)
+    for y, out, found in zip(rows, *filled, strict=True):
         assert out == pytest.approx(value(span, y, p), abs=1e-12)
         by_turn, by_pull = slopes(span, y, p)
         assert found == pytest.approx(np.append(by_turn, by_pull), rel=1e-11, abs=1e-10)

@@ -225,12 +225,12 @@ def test_fingers_that_are_told_not_to_touch_still_touch_objects():
 
 
 def test_methods_that_may_pass_over_touches_say_so_unless_their_steps_are_bounded():
-    short = {"simulation.duration": 4e-5, "simulation.method": "BDF"}
+    short = {"simulation.duration": 1e-5, "simulation.method": "BDF"}
     with pytest.warns(
         AccuracyWarning, match=r"BDF sees touches at the ends of its steps only: give simulation.max_step"
     ):
         fp.simulate(fp.load_scenario("press", short))
-    result = fp.simulate(fp.load_scenario("press", short | {"simulation.max_step": 2e-6}))
+    result = fp.simulate(fp.load_scenario("press", short | {"simulation.max_step": 5e-7}))
     assert result.attrs["solver_steps"] >= 20
     with pytest.raises(fp.InputError, match=r"simulation.max_step = 1e-05: is for methods of scipy"):
         fp.simulate(fp.load_scenario("press", {"simulation.duration": 2e-4, "simulation.max_step": 1e-5}))

@@ -66,6 +66,7 @@ def whole(robot, hand):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("coarse_sections")
 def test_every_figure_of_a_finger_takes_it(foreign):
     figures = [
         plot_workspace(foreign),
