@@ -26,7 +26,7 @@ class Likelihood:
         noises: Number of the noise of each signal, shape (s,).
         least_noise: Least standard deviation of each, shape (s,).
         outputs: Number of the output of each, whose windows are several signals, shape (s,).
-        kinds: Number of what each measures, whatever the recording, shape (s,).
+        kinds: Number of the noise that each names or, if none, of what it measures, whatever the recording, shape (s,).
         largest: Largest magnitude of the readings of each, shape (s,).
         ordered: Whether samples of each follow each other, so that neighbours may err alike, shape (s,).
     """

@@ -20,7 +20,7 @@ from finger_pin.identification.intervals import NORMAL_95
 from finger_pin.identification.misfit import scatter as scatter_of
 from finger_pin.identification.parameters.keys import acts_on, recording_pattern, scenario_key
 from finger_pin.identification.residuals.models import held_out_residuals, held_out_rows
-from finger_pin.identification.residuals.recordings import Recording, read_recording
+from finger_pin.identification.residuals.recordings import RecordedSignal, Recording, read_recording
 from finger_pin.identification.residuals.residuals import Residuals
 from finger_pin.mechanism.coerce import FingerLike, resolve_finger
 from finger_pin.mechanism.finger import Finger
@@ -122,7 +122,7 @@ def predictions(
         computed = zip(function.signals, residuals, function.error_slopes(z), growths, refitted, strict=True)
         rows_by_signal: dict[str, list[Array]] = {}
         for signal, residual, slopes, growth, errors in computed:
-            noise, factor = _noise(result, recording.name, signal.name)
+            noise, factor = _noise(result, signal)
             deviation = factor * np.sqrt((noise * growth) ** 2 + parameter_variance(slopes, covariance, errors))
             value = np.where(np.isfinite(residual), signal.measured - residual, np.nan)
             rows = np.stack([signal.instant, signal.load, signal.measured, value, NORMAL_95 * deviation])
@@ -171,21 +171,29 @@ def _at_estimate(
     return function, z, np.nan_to_num(covariance, nan=0.0), left_out
 
 
-def _noise(result: xr.Dataset, recording: str, name: str) -> tuple[float, float]:
-    """Return the deviation of a fitted signal, and the factor on its band.
+def _noise(result: xr.Dataset, signal: RecordedSignal) -> tuple[float, float]:
+    """Return the deviation of readings of a signal, and the factor on its band; not a number if nothing tells it.
 
-    The deviation is that of the same recording, else that for others of the same name. The rest of a motion that was
-    fitted has no factor: what was left out were whole motions.
+    The deviation is that of the same recording, else that of fitted signals that share its noise, else of those of its
+    name. The rest of a motion that was fitted has no factor: what was left out were whole motions.
     """
-    # A result of an earlier version has no other.
-    pooled = "noise_elsewhere" if "noise_elsewhere" in result else "noise_deviation"
-    factors = result["band_factor"].values if "band_factor" in result else np.ones(result.sizes["signal"])
-    for key, name_of_deviation in ((f"{recording}.{name}", "noise_deviation"), (name, pooled)):
-        columns = (result["signal"].values, result[name_of_deviation].values, factors, result["signal_steady"].values)
-        for signal, deviation, factor, steady in zip(*columns, strict=True):
-            if key in (signal, str(signal).partition(".")[2]):
-                return float(deviation), float(factor) if steady or key == name else 1.0
-    return math.nan, 1.0
+    fitted = result["signal"].values.astype(str)
+    # A result of an earlier version lacks these.
+    elsewhere = result["noise_elsewhere" if "noise_elsewhere" in result else "noise_deviation"].values
+    factors = result["band_factor"].values if "band_factor" in result else np.ones(len(fitted))
+    noises = result["shared_noise"].values.astype(str) if "shared_noise" in result else np.full(len(fitted), "")
+    own = np.flatnonzero(fitted == f"{signal.recording}.{signal.name}")
+    if len(own):
+        k = int(own[0])
+        factor = float(factors[k]) if result["signal_steady"].values[k] else 1.0
+        return float(result["noise_deviation"].values[k]), factor
+    of_name = np.array([each.partition(".")[2] == signal.name for each in fitted], dtype=bool)
+    may_share = result["signal_units"].values == signal.unit if signal.shared_noise else of_name
+    of_noise = (noises == signal.shared_noise) & may_share
+    members = of_noise if of_noise.any() else of_name
+    if not members.any():
+        return math.nan, 1.0
+    return float(np.sqrt(np.mean(elsewhere[members] ** 2))), float(factors[members].max())
 
 
 def _repeats(recording: Recording, name: str, recordings: Sequence[Recording]) -> float:

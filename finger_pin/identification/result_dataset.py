@@ -172,7 +172,7 @@ def _signals(pipeline: FitPipeline) -> dict[str, Any]:
     found = repeats(objective.function, best.residuals)
     repeated = {first.index(k): each for each in found for k in each.signals if k in first}
     by_output = [repeated.get(k) for k in range(len(first))]
-    elsewhere = "deviation of readings of recordings that were not fitted, by all fitted ones of the name"
+    elsewhere = "deviation of readings of recordings that were not fitted, by all fitted ones of the name, or noise"
     chance = {
         "units": "1",
         "long_name": "probability that a model that misses nothing misses as much (F test)",
@@ -199,6 +199,7 @@ def _signals(pipeline: FitPipeline) -> dict[str, Any]:
     return {
         "signal_units": ("signal", [signals[k].unit for k in first]),
         "signal_steady": ("signal", [not signals[k].ordered for k in first]),
+        "shared_noise": ("signal", [signals[k].shared_noise for k in first]),
         "signal_samples": ("signal", samples),
         "lack_of_fit": ("signal", [each.p_value if each else math.nan for each in by_output], chance),
         **_variables("signal", columns),

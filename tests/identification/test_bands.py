@@ -153,6 +153,27 @@ def test_a_fit_without_refits_keeps_estimate_and_intervals_and_has_the_band_of_a
     assert "No recording was left out by a refit" in told(quick) and "No recording was left out" not in told(whole)
 
 
+def with_noise(name, **more):
+    return {**STEADY, "outputs": {"tendon_tension.T1": {"column": "out", "noise": name}}, **more}
+
+
+def test_the_band_of_a_held_out_output_has_the_noise_that_it_names():
+    """A quiet and a loud cell: the band of a regression of the quiet readings, which tell the line, through zero."""
+    rng = np.random.default_rng(4)
+    data = {name: readings(rng, 0.2, noise=0.02) for name in ("quiet", "next", "unnamed")}
+    data["loud"] = readings(rng, 0.2, noise=1.0)
+    recordings = {name: with_noise(name) for name in ("quiet", "loud")}
+    recordings |= {"next": with_noise("quiet", held_out=True), "unnamed": {**STEADY, "held_out": True}}
+    result = identify(recordings, data, refits=False, profiles=False)
+    named, unnamed = (result.predicted_band.values[result.predicted_index == k] for k in range(2))
+    load, out = data["quiet"].values()
+    off = out - load @ out / (load @ load) * load
+    noise = student.ppf(0.975, 11) * np.sqrt(off @ off / 11)
+    np.testing.assert_allclose(named, np.hypot(noise, noise / np.sqrt(load @ load) * load), rtol=0.02)
+    # Who names none has the mean square of both.
+    assert unnamed.min() > 1.96 * 0.5
+
+
 @pytest.mark.parametrize("refits", [True, False])
 def test_open_combinations_are_said_to_be_tried_only_where_refits_are_asked_for(refits):
     """Of coefficient, turn and gain a line through the origin tells exp(-mu phi) over the gain alone."""

@@ -92,7 +92,7 @@ def test_readings_that_are_held_out_are_predicted_with_a_band_by_noise_and_covar
 
 def test_a_part_of_a_motion_is_held_out_and_runs_with_equal_inputs_are_repeats():
     data = {"first": ramp(3), "second": ramp(4)}
-    recordings = {"first": motion(held_out=[0.6, 0.8]), "second": motion()}
+    recordings = {"first": motion(held_out=list(np.array([0.6, 0.8]))), "second": motion()}
     result = found(recordings, data)
     apart = (data["first"]["t"] >= 0.6 - 1e-12) & (data["first"]["t"] <= 0.8 + 1e-12)
     assert np.sum(apart) == result.sizes["predicted"] == 11

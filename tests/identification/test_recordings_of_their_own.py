@@ -156,6 +156,10 @@ def test_one_number_in_two_keys_is_found_once_with_its_factor(bench):
         ((f"{SPRING} & {MASS}", MASS), f"is found for a as {SPRING} & {MASS} too"),
         ((f"{SPRING} & finger.joints.pin.link.mess",), "finger.joints.pin.link.mess"),
         ((f"{SPRING} & 1e6 * {MASS}",), "must be at most"),
+        (
+            ("recordings.a.A.offset & -1 * recordings.a.B.offset",),
+            "ties corrections of columns: only keys of the scenario",
+        ),
     ],
 )
 def test_keys_that_do_not_share_a_number_are_refused_in_one_line(bench, keys, said):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from numbers import Real
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -21,18 +22,23 @@ IMPOSED, _KINEMATIC, _EFFORT_OUTPUTS = (
 Bounds = dict[str, Annotated[tuple[float, float], vector(2)]]
 
 
+def _is_number(value: Any) -> bool:
+    """Return whether a value is a number, one of NumPy's included."""
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
 def _held_out(value: Any) -> bool | tuple[float, float] | dict[str, Any]:
     if isinstance(value, bool):
         return value
     if isinstance(value, dict):
         for name, cells in value.items():
             listed = cells if isinstance(cells, list | tuple) else [cells]
-            if not listed or not {*map(type, listed)} <= {int, float, str}:
+            if not listed or not all(isinstance(cell, str) or _is_number(cell) for cell in listed):
                 raise problem(name, "must be a number or word of that column, or a list of them", cells)
         if not value:
             raise problem("", "must name a column", value)
         return value
-    numbers = isinstance(value, list | tuple) and len(value) == 2 and {*map(type, value)} <= {int, float}
+    numbers = isinstance(value, list | tuple) and len(value) == 2 and all(map(_is_number, value))
     if not numbers or not 0.0 <= value[0] < value[1] < math.inf:
         raise problem("", "must be true, or the first and the last second of a part, such as [2.0, 3.0]", value)
     return float(value[0]), float(value[1])

@@ -117,6 +117,8 @@ def is_scenario_key(key: str, columns: Iterable[str]) -> bool:
     names = sorted(columns)
     if recording_pattern(key) is None or corrected_column(key, names):
         return recording_pattern(key) is None
+    if "&" in scenario_key(key) and any(entry.endswith(tuple(Corrections._fields)) for entry, _ in tied_entries(key)):
+        raise InputError(entry_of(key), "ties corrections of columns: only keys of the scenario can be one number")
     acts_somewhere = any(acts_on(key, each.partition(".")[0]) for each in names)
     if acts_somewhere and scenario_key(key).partition(".")[0] in Scenario.model_fields:
         return True

@@ -122,7 +122,7 @@ class Residuals:
             self.growth.groups,
             self.growth.floor,
             numbered([(each.recording, each.name) for each in self.signals]),
-            numbered([each.name for each in self.signals]),
+            numbered([(each.shared_noise, each.shared_noise or each.name) for each in self.signals]),
             np.array([np.max(np.abs(each), initial=0.0) for each in measured]),
             np.array([each.ordered for each in self.signals]),
         )
