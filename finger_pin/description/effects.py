@@ -162,8 +162,11 @@ OF_SCENARIO = (
 
 def idle(described: Description, rules: tuple[Rule, ...]) -> Iterator[tuple[str, Any, str]]:
     """Yield the entries that are set and have no effect: dotted name, value and message."""
+    tables: dict[str, list[tuple[str, Description]]] = {}
     for rule in rules:
-        for name, table in _tables(described, rule.table):
+        if rule.table not in tables:
+            tables[rule.table] = list(_tables(described, rule.table))
+        for name, table in tables[rule.table]:
             entries = table.model_fields_set
             if entries and rule.entries:
                 entries = entries.intersection(rule.entries)

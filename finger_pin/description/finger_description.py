@@ -108,7 +108,7 @@ class FingerDescription(Description):
             ("passive_tendon", self.passive_names, "passive tendon"),
             ("stroke_limiter", tuple(self.joints), "joint"),
         ):
-            for field, value in getattr(self, group):
+            for field, value in vars(getattr(self, group)).items():
                 if isinstance(value, tuple):
                     check_size(value, names, f"{group}.{field}", kind)
             numbers[group] = per_item(getattr(self, group), len(names))
@@ -282,8 +282,13 @@ class HandSettings(Description):
     def joined(self) -> FingerDescription:
         """Return all fingers together: joints finger by finger; the actuated tendons of all, then the passive ones."""
         is_tree = any(placed.finger.tree.bodies for placed in self.fingers.values())
-        joined = self._put_together().model_copy(update={"tree": self.bodies} if is_tree else None)
-        joined = joined.model_copy(update={"couplings": joined.couplings | self.couplings})
+        together = self._put_together()
+        joined = together.updated(couplings=together.couplings | self.couplings)
+        if is_tree:
+            joined = joined.updated(tree=self.bodies)
+        else:
+            # Nothing that was put on top has a share in them.
+            vars(joined)["numbers"] = together.numbers
         joined._hand = self
         return joined
 

@@ -24,7 +24,7 @@ from finger_pin.mechanism.servos import Actuators
 from finger_pin.mechanism.sheaths import in_sheaths
 from finger_pin.mechanism.sources import source_rows
 from finger_pin.mechanism.state import BLOCKS, Layout
-from finger_pin.mechanism.tendons import Tendons
+from finger_pin.mechanism.tendons import Places, Tendons
 from finger_pin.mechanism.tree_mechanism import TreePaths, along_paths
 from finger_pin.mechanism.wiring import replace_tables
 from finger_pin.typing import Array
@@ -78,6 +78,7 @@ class Assembly(NamedTuple):
         drive_matrices: Weights with which drives and passive tendons' hysteresis pull the strands, by table, (s, k).
         wraps: By table of wraps beyond the first ones, which row is of which tendon, shape (t, rows).
         extra_rows: Tables beside the paper's: those of a tree, canals, hysteresis, and rows of the user's own.
+        places: By table of friction of tendons, arguments of `Tendons.at`; none where more than that follows from it.
     """
 
     mechanism: Mechanism
@@ -86,6 +87,7 @@ class Assembly(NamedTuple):
     drive_matrices: dict[str, Array]
     wraps: dict[str, Array]
     extra_rows: tuple[Rows, ...]
+    places: dict[str, Places]
 
 
 def assemble(
@@ -142,7 +144,8 @@ def assemble(
     layout = _state_layout(parts, further, scene, [*of_tree.values()], canals.tables, body.slides)
     check_layout(layout, mechanism)
     extra_rows = (*of_tree.values(), *canals.tables, *further)
-    return Assembly(mechanism, scene, layout, matrices, canals.wraps, extra_rows)
+    places = {} if sheaths or args.tables else canals.places | tendons.places
+    return Assembly(mechanism, scene, layout, matrices, canals.wraps, extra_rows, places)
 
 
 def _numbers_on_paths(description: FingerDescription, width: int) -> NDArray[np.int64]:

@@ -23,7 +23,7 @@ from finger_pin.laws.capstan import CANAL_FRICTION, CORD_TENSION
 from finger_pin.mechanism.groups import BRANCHES, CANALS, CORDS, ELASTIC, SOURCES, TENDON_LOSSES, WRAPS
 from finger_pin.mechanism.rows import Rows
 from finger_pin.mechanism.tendon_paths import TendonPaths
-from finger_pin.mechanism.tendons import BRISTLES, SLACK, Tendons
+from finger_pin.mechanism.tendons import BRISTLES, SLACK, Places, Tendons
 from finger_pin.mechanism.tree_mechanism import actuator_table
 from finger_pin.typing import Array
 
@@ -34,6 +34,7 @@ class Canals:
     Attributes:
         tables: Their rows, none without any.
         loads: By table, weights with which rows load the pins of joints, shape (n, rows).
+        places: By table, arguments of `Tendons.at` for its numbers of friction.
         wraps: By table of the own tendons' wraps, which row is of which tendon, shape (t, rows).
     """
 
@@ -60,6 +61,7 @@ class Canals:
         self._joints, self._width = tuple(description.joints), width
         self.tables: list[Rows] = []
         self.loads: dict[str, Array] = {}
+        self.places: dict[str, Places] = {}
         # They load the pins by themselves.
         self._loading = {"driven_tendons", *drive_matrices}
         rubbing = self._tree.rubbing
@@ -172,14 +174,13 @@ class Canals:
         arm, bends = np.zeros((2, len(wraps), self._width))
         arm[:, : len(self._joints)] = arms
         bends[:, : len(self._joints)] = [wrap.turns(self._joints) for wrap in wraps]
-        numbers = self._tendons.at(tendons, wraps)
         # Drag is that of the whole tendon, before it is divided.
-        numbers[-1] *= not group.startswith(BRANCHES)
+        self.places[group] = tendons, wraps, not group.startswith(BRANCHES)
         return Rows(
             group=group,
             law=CANAL_FRICTION,
             names=tuple(names),
-            parameters=np.vstack([numbers, self._one_way[tendons]]),
+            parameters=np.vstack([self._tendons.at(*self.places[group]), self._one_way[tendons]]),
             arm=arm,
             inputs=inputs,
             bends=bends,

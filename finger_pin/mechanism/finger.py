@@ -16,6 +16,7 @@ from finger_pin.description.loading import DescriptionLike, describe
 from finger_pin.description.objects import Object
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.assembly import ConstructorArgs, Parts, assemble, check_joints
+from finger_pin.mechanism.changed_parameters import with_changed_parameters
 from finger_pin.mechanism.evaluation import Evaluation, Outputs, check_outputs
 from finger_pin.mechanism.from_pinocchio import on_model
 from finger_pin.mechanism.groups import CANALS
@@ -45,6 +46,7 @@ class Finger:
         mechanism: All of it as coordinates and rows.
         paths: The tendons as functions of the posture.
         extra_rows: Tables of rows that were added, those of a tree first.
+        places: By table of friction of tendons, arguments of `Tendons.at`; none where more follows from it.
         wraps: By table of wraps beyond the first ones, which row is of which tendon, shape (t, rows).
         drive_matrices: Weights with which drives and passive tendons' hysteresis pull the strands, by table, (s, k).
         constructor_args: What it was built from besides its description.
@@ -84,8 +86,8 @@ class Finger:
         parts = Parts.from_description(description)
         self.routing, self.tendons, self.actuators, self.joint_friction, self.stroke_limiter, self.springs = parts
         self.visuals: pin.GeometryModel | None = None
-        assembly = assemble(description, self.rigid_body, self.paths, parts, self.constructor_args)
-        self.mechanism, self.scene, self.layout, self.drive_matrices, self.wraps, self.extra_rows = assembly
+        whole = assemble(description, self.rigid_body, self.paths, parts, self.constructor_args)
+        self.mechanism, self.scene, self.layout, self.drive_matrices, self.wraps, self.extra_rows, self.places = whole
 
     def __repr__(self) -> str:
         """Return name, joints and tendons."""
@@ -127,12 +129,13 @@ class Finger:
 
     def changed(self, description: FingerDescription, objects: Mapping[str, Object] | None) -> Finger:
         """Return the finger that another description and other objects make, with the body and rows that were given."""
-        args = self.constructor_args
-        finger = Finger(description, args.rigid_body, args.rows, objects, args.tables)
-        finger.visuals = self.visuals
-        if finger.layout == self.layout:
-            # With all that follows from it.
-            finger.layout = self.layout
+        if (finger := with_changed_parameters(self, description, objects)) is None:
+            args = self.constructor_args
+            finger = Finger(description, args.rigid_body, args.rows, objects, args.tables)
+            finger.visuals = self.visuals
+            if finger.layout == self.layout:
+                # With all that follows from it.
+                finger.layout = self.layout
         return finger
 
     def with_prescribed_joints(self) -> Finger:
@@ -150,7 +153,7 @@ class Finger:
         whole, joints = self.mechanism, len(self.routing.joints)
         prescribed = np.append(np.arange(joints), np.full(whole.coordinates - joints, -1))
         parts = whole.body, whole.listed, whole.lumps, whole.inertia, whole.channels
-        finger.mechanism = Mechanism(*parts, prescribed=prescribed, tendons=whole.tendons)
+        finger.mechanism, finger.places = Mechanism(*parts, prescribed=prescribed, tendons=whole.tendons), {}
         return finger
 
     @property

@@ -97,6 +97,23 @@ class JointFriction:
         """Stribeck's velocity, rad/s, and the exponent of his curve, 1 or 2, shape (n,) each."""
         return self._numbers["stribeck_velocity"], self._numbers["stribeck_exponent"]
 
+    @property
+    def parameters(self) -> Array:
+        """Numbers of the law, shape (parameters, n).
+
+        Raises:
+            InputError: If there is drag that the law lacks.
+        """
+        settings, law = self.description.joint_friction, self.law
+        for key in ("drag", "drag_asymmetry"):
+            if np.any(self._numbers[key]) and key not in law.parameters:
+                allowed = f"has no effect with law = {settings.law!r}, which lacks it"
+                raise InputError(f"finger.joint_friction.{key}", allowed)
+        values = {**self._numbers, **bristles(settings, self._numbers)}
+        values |= {name: getattr(self, name) for name in ("kinetic", "static", "viscous", "drag")}
+        values["static_drag"] = static_drag(self.drag, self.kinetic, self.static)
+        return np.array([values[name] for name in law.parameters])
+
     def break_away_drag(self, direction: Array) -> Array:
         """Return the level without load at which joints let go in directions of 1 or -1, shape (..., n), N m."""
         level: Array = directed_drag(static_drag(self.drag, self.kinetic, self.static), self.drag_asymmetry, direction)
@@ -110,14 +127,7 @@ class JointFriction:
             width: Number of coordinates.
             canals: Weights with which canals of a tree, and what pulls through them, load the pins, shape (n, rows).
         """
-        settings, law, bearing, pressing = self.description.joint_friction, self.law, self.bearing, self.loads
-        for key in ("drag", "drag_asymmetry"):
-            if np.any(self._numbers[key]) and key not in law.parameters:
-                allowed = f"has no effect with law = {settings.law!r}, which lacks it"
-                raise InputError(f"finger.joint_friction.{key}", allowed)
-        values = {**self._numbers, **bristles(settings, self._numbers)}
-        values |= {name: getattr(self, name) for name in ("kinetic", "static", "viscous", "drag")}
-        values["static_drag"] = static_drag(self.drag, self.kinetic, self.static)
+        law, bearing, pressing = self.law, self.bearing, self.loads
         # Strands beyond the actuated ones are halves of passive tendons.
         actuated = self.routing.actuated
         loads = {"driven_tendons": pressing[:, :actuated], "passive_halves": pressing[:, actuated:]}
@@ -126,7 +136,7 @@ class JointFriction:
             group="joint_friction",
             law=law,
             names=self.routing.joints,
-            parameters=np.array([values[name] for name in law.parameters]),
+            parameters=self.parameters,
             arm=np.eye(len(bearing), width) * bearing[:, None],
             loads=loads,
             pins=np.where(bearing, np.arange(len(bearing)), -1),
@@ -166,17 +176,22 @@ class StrokeLimiter:
         """Whether each joint has limits, shape (n,)."""
         return np.array([joint.limited for joint in self.description.joints.values()])
 
-    def rows(self, width: int) -> Rows:
-        """Return the table of the limiters."""
+    @property
+    def parameters(self) -> Array:
+        """Numbers of `STROKE_LIMITER`, shape (parameters, n)."""
         numbers, limited = self.description.numbers["stroke_limiter"], self.limited
         lower = np.where(limited, self.lower, -_BEYOND_ANY_JOINT)
         upper = np.where(limited, self.upper, _BEYOND_ANY_JOINT)
+        return np.array([lower, upper, *(numbers[name] for name in STROKE_LIMITER.parameters[2:])])
+
+    def rows(self, width: int) -> Rows:
+        """Return the table of the limiters."""
         return Rows(
             group="limiter",
             law=STROKE_LIMITER,
             names=tuple(self.description.joints),
-            parameters=np.array([lower, upper, *(numbers[name] for name in STROKE_LIMITER.parameters[2:])]),
-            arm=np.eye(len(limited), width),
+            parameters=self.parameters,
+            arm=np.eye(len(self.description.joints), width),
             stored=_LIMITERS,
             powers=(_LIMITERS,),
         )

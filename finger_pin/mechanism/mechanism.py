@@ -57,6 +57,7 @@ class Mechanism:
         states: For every table in that order the range of its states in z.
         energies: Energies and powers of the rows.
         channels: Number of inputs from outside.
+        wiring: One for all mechanisms that differ in parameters of laws and in inertias alone.
         moved: Whether the base moves along a path.
         prescribed: For coordinates that are moved along paths, the number of their acceleration among all; else -1.
         tendons: Names of the tables that are tendons, whose torque is also summed up apart.
@@ -74,13 +75,12 @@ class Mechanism:
         tendons: Sequence[str] = (),
     ) -> None:
         """Join coordinates and rows, as wide as there are coordinates; more inputs than rows have if asked for."""
-        self.body = body
-        self.lumps = tuple(lumps)
+        self.body, self.lumps = body, tuple(lumps)
         self.inertia = np.zeros(0) if inertia is None else np.asarray(inertia, dtype=float)
         # The core evaluates contacts before all else.
         self.listed = tuple(sorted(rows, key=lambda table: table.law.arms == 1))
         self.rows = sort_tables(self.listed)
-        self.moved, self.tendons = moved, tuple(tendons)
+        self.moved, self.tendons, self.wiring = moved, tuple(tendons), object()
         self.prescribed = np.full(self.coordinates, -1) if prescribed is None else prescribed
         self.energies = Energies.from_rows(self.rows, moved, not moved and bool(np.any(self.prescribed >= 0)))
         self.channels = max([channels, *(int(table.channels.max(initial=-1)) + 1 for table in self.rows)])

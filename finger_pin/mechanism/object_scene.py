@@ -12,6 +12,7 @@ from finger_pin.description.caching import memoised
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.links import link_body
 from finger_pin.description.objects import Object
+from finger_pin.description.placement import Palm
 from finger_pin.description.tree_actuators import Wrench
 from finger_pin.exceptions import InputError
 from finger_pin.laws.spring import JOINT_SPRING
@@ -195,6 +196,15 @@ class Scene:
     def world(self) -> tuple[str, ...]:
         """Names of the joints of the world seen by a moving palm; none for an empty world."""
         return WORLD if self.body.model.existJointName(WORLD[0]) else ()
+
+    def with_objects(self, objects: Mapping[str, Object], body: RigidBody) -> Scene:
+        """Return the scene with objects of other masses and paths, and the body of these."""
+        return replace(self, objects=objects, free={name: objects[name] for name in self.free}, body=body)
+
+    def with_masses(self, objects: Mapping[str, Object], body: RigidBody, palm: Palm | None) -> Scene | None:
+        """Return the scene on a finger's body with other masses and paths; None if its structure would be another."""
+        extended = add_free_objects(body, objects, palm)
+        return self.with_objects(objects, extended) if extended.topology is self.body.topology else None
 
     def start(self) -> tuple[Array, Array]:
         """Return poses and velocities of the free objects at t = 0, shapes (7 f,) and (6 f,)."""

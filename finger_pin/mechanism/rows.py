@@ -201,6 +201,14 @@ class Rows:
 
         return replace(self, arm=wide(self.arm), measure=wide(self.measure), bends=wide(self.bends))
 
+    def with_parameters(self, parameters: Array | None) -> Rows:
+        """Return the same rows with other first parameters of the law, shape (at most all, k); itself without any."""
+        if parameters is None:
+            return self
+        rows = object.__new__(Rows)
+        vars(rows).update(vars(self), parameters=np.vstack([parameters, self.parameters[len(parameters) :]]))
+        return rows
+
     def __getitem__(self, name: str) -> Array:
         """Return a parameter of the law by its name, shape (k,); of contacts that of each."""
         numbers: Array = self.parameters[self.law.parameters.index(name)]

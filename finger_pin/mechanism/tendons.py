@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,9 @@ SLACK = Energy("slack", "tensions cut at zero")
 BRISTLES = Energy("tendon_bristles", "tendon bristles")
 _HALVES = ("proximal", "distal")
 _HYSTERESIS_ENERGY = Energy("passive_hysteresis", "passive tendons stretching")
+
+#: Indices of tendons, the place of each, and whether their drag counts there.
+Places: TypeAlias = tuple[Sequence[int], Sequence[Cord], bool]
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,7 +242,7 @@ class Tendons:
         driven[actuated:] = np.eye(passive, width, joints)
         bends[:, :joints] = routing.first_turns
         offset, names = np.array([wrap.offset for wrap in first]), routing.passive_names
-        friction = self.at(range(len(first)), first)
+        friction = {group: self.at(*places) for group, places in self.places.items()}
         wired = self._pulls(drives)
         replaced = np.any(np.hstack([np.zeros((actuated, 0)), *wired.values()]), axis=1)
         least = np.where(self.coupled[:actuated].any(axis=1), -UNLIMITED_FORCE, 0.0)
@@ -252,7 +256,7 @@ class Tendons:
                 group="driven_tendons",
                 law=DRIVEN_TENDON,
                 names=routing.tendons[:actuated],
-                parameters=np.vstack([friction[:, :actuated], replaced, least]),
+                parameters=np.vstack([friction["driven_tendons"], replaced, least]),
                 arm=driven[:actuated],
                 channels=np.where(replaced, -1, np.arange(actuated)),
                 inputs=wired,
@@ -265,7 +269,7 @@ class Tendons:
                 group="passive_tendons",
                 law=PASSIVE_FRICTION,
                 names=names,
-                parameters=friction[:, actuated:],
+                parameters=friction["passive_tendons"],
                 arm=driven[actuated:],
                 loads=loads,
                 bends=bends[actuated:],
@@ -275,9 +279,19 @@ class Tendons:
             ),
         ]
 
-    def at(self, tendons: Sequence[int], wraps: Sequence[Cord]) -> Array:
-        """Return the numbers of `friction` of some tendons at some of their places, shape (f, k)."""
+    @property
+    def places(self) -> dict[str, Places]:
+        """By table, arguments of `at` for the numbers of its tendons at their first places."""
+        actuated, first = self.routing.actuated, [places[0] for places in self.wraps[: len(self.routing.tendons)]]
+        return {
+            "driven_tendons": (range(actuated), first[:actuated], True),
+            "passive_tendons": (range(actuated, len(first)), first[actuated:], True),
+        }
+
+    def at(self, tendons: Sequence[int], wraps: Sequence[Cord], drags: bool = True) -> Array:
+        """Return the numbers of `friction` of some tendons at some of their places, shape (f, k); drag if asked."""
         friction = self.friction[:, tendons]
         shared = [PASSIVE_FRICTION.parameters.index(name) for name in ("stiffness", "viscous", "drag")]
         friction[shared] *= [wrap.share for wrap in wraps]
+        friction[-1] *= drags
         return friction

@@ -81,3 +81,52 @@ def test_numbers_beside_a_tree_keep_the_structure_of_its_rows_and_of_free_object
     assert structure(environment__objects__ball__angular_damping=2e-5) is first
     # Powers of an angle are measured from the middle of its range.
     assert structure(joints__bend__range=[-0.4, 1.5]) is not first
+
+
+FRICTION = {"tendon_friction.viscous": 0.7, "tendon_friction.drag": 0.02, "joint_friction.viscous": 1e-4}
+LEFT = "hand.fingers.left.finger"
+# Beside the finger; of the palm the path alone.
+MOVED = {"hand.palm.path.y.amplitude": 0.01, "environment.objects.ball.mass": 0.04}
+AT_BENDS = {"tendon_friction.place": "bends"}
+
+
+@pytest.mark.parametrize(
+    ("name", "prefix", "first", "values", "kept"),
+    [
+        ("reversals", "finger", {}, {**FRICTION, "stroke_limiter.stiffness": 32.0}, True),
+        ("reversals", "finger", AT_BENDS, FRICTION, True),
+        ("underactuated", "finger", {}, FRICTION, True),
+        ("press", "finger", {}, FRICTION, True),
+        ("pinch", LEFT, {}, FRICTION, True),
+        ("pinch", "", {}, MOVED, True),
+        ("reversals", "finger", {}, AT_BENDS, False),
+        ("reversals", "finger", {}, {"joint_friction.law": "dahl"}, False),
+        ("reversals", "finger", {}, {"passive_tendon.mass": 0.01}, False),
+        ("pinch", LEFT, {}, {"joints.medial.link.mass": 0.02}, False),
+    ],
+)
+def test_a_finger_with_changed_values_has_the_bits_of_one_built_anew(name, prefix, first, values, kept):
+    before, after = ({f"{prefix}.{key}".lstrip("."): each for key, each in keys.items()} for keys in (first, values))
+    scenario = fp.load_scenario(name, before)
+    other = fp.load_scenario(scenario, after)
+    finger, anew = (fp.Finger(each.finger, objects=each.environment.objects) for each in (scenario, other))
+    changed, evaluator = finger.changed(other.finger, other.environment.objects), CompiledMechanism(finger.mechanism)
+    assert (changed.mechanism.wiring is finger.mechanism.wiring) == kept
+    (structure, expected), (same, numbers) = compile_mechanism(anew.mechanism), compile_mechanism(changed.mechanism)
+    assert same is structure
+    assert evaluator.rebind(changed.mechanism) == (evaluator.structure is compile_mechanism(finger.mechanism)[0])
+    for each in (numbers, evaluator.parameters):
+        assert all(map(np.array_equal, leaves(each), leaves(expected)))
+    assert changed.description == anew.description and changed.layout == anew.layout
+    assert (changed.scene and changed.scene.objects) == (anew.scene and anew.scene.objects)
+    assert np.array_equal(changed.tendons.friction, anew.tendons.friction)
+
+
+def test_objects_around_a_finger_that_had_none_are_there_after_a_change():
+    finger = fp.Finger("ub")
+    ball = fp.load_scenario("pinch").environment.objects["ball"]
+    assert finger.changed(finger.description, {"ball": ball}).scene is not None
+    held = fp.Finger("ub", objects={"ball": ball})
+    assert held.changed(held.description, None).scene is None
+    heavier = held.changed(held.description, {"ball": ball.updated(mass=0.1)})
+    assert heavier.scene.mass == [0.1] and heavier.constructor_args.objects["ball"].mass == 0.1

@@ -59,8 +59,11 @@ class CompiledMechanism:
         """Take another mechanism of the same structure; return False if it is none, and this is of no use."""
         if mechanism is self.mechanism:
             return True
-        self.mechanism, structure = mechanism, self.structure
-        self.structure, self.parameters = compile_mechanism(mechanism)
+        before, self.mechanism, structure = self.mechanism, mechanism, self.structure
+        if mechanism.wiring is before.wiring:
+            self.parameters = self.parameters.changed(mechanism, before)
+        else:
+            self.structure, self.parameters = compile_mechanism(mechanism)
         return structure is self.structure and self.models.rebind(self.parameters)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -218,8 +221,10 @@ class CompiledFinger:
 
     def rebind(self, finger: Finger) -> bool:
         """Take another finger of the same structure; return False if it is none, and this is of no use."""
+        kept = finger.mechanism.wiring is self.finger.mechanism.wiring and finger.rigid_body is self.finger.rigid_body
         self.finger = finger
-        vars(self).pop("_without_surroundings", None)
+        if not kept:
+            vars(self).pop("_without_surroundings", None)
         return self.mechanism.rebind(finger.mechanism)
 
     def evaluate(

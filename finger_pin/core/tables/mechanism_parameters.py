@@ -66,6 +66,13 @@ class Parameters(NamedTuple):
         """Return the same with separate memory for what changes in place."""
         return self._replace(bodies=self.bodies.copy(), tip_force=self.tip_force.copy())
 
+    def changed(self, mechanism: Mechanism, before: Mechanism) -> Parameters:
+        """Return those of a mechanism that shares its wiring with the one of these."""
+        other = self._replace(laws=_laws(mechanism.rows))
+        if mechanism.body is before.body:
+            return other
+        return other._replace(bodies=weighed(_structure(mechanism)[0], mechanism.body.model))
+
 
 def compile_mechanism(mechanism: Mechanism) -> tuple[Structure, Parameters]:
     """Return the structure of a mechanism, which is built once for one wiring, and its parameters.
