@@ -33,9 +33,12 @@ _LARGEST = 100_000_000
 def replacing(path: str | Path) -> Iterator[str]:
     """Give a temporary path beside a file, and move it into place only if all went well.
 
-    An earlier file of that name stays untouched until the new one is complete.
+    An earlier file of that name stays untouched until the new one is complete. A device or a pipe is itself written to.
     """
     target = Path(path)
+    if target.exists() and not (target.is_file() or target.is_dir()):
+        yield str(target)
+        return
     handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}-", suffix=target.suffix)
     os.close(handle)
     try:

@@ -4,13 +4,14 @@ import errno
 import os
 import signal
 import stat
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 import finger_pin as fp
 from finger_pin.description.loading import load_scenario
 from finger_pin.exceptions import InputError
-from finger_pin.files import replacing
+from finger_pin.files import replacing, write_text
 from finger_pin.simulation.result_folder import ResultFolder
 from finger_pin.views.summary import summarize
 from finger_pin.views.viewer import write_animation
@@ -91,6 +92,16 @@ def test_a_file_in_a_folder_that_is_not_there_is_an_error(tmp_path):
     with pytest.raises(FileNotFoundError), replacing(tmp_path / "no" / "file.txt"):
         pass
     assert contents(tmp_path) == {}
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes by name here")
+def test_a_pipe_gets_the_text_and_stays_a_pipe(tmp_path):
+    os.mkfifo(pipe := tmp_path / "out")
+    with ThreadPoolExecutor(1) as pool:
+        read = pool.submit(pipe.read_text)
+        write_text(pipe, "a finger")
+    assert read.result() == "a finger"
+    assert [each.name for each in tmp_path.iterdir()] == ["out"] and pipe.is_fifo()
 
 
 def test_results_appear_when_they_are_published(tmp_path, result):
