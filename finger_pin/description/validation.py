@@ -49,7 +49,10 @@ class Description(Frozen):
 
     def updated(self, **entries: Any) -> Self:
         """Return a copy with other values of some entries, unchecked; a dictionary updates a part that is there."""
+        fields = type(self).model_fields
         for name, entry in entries.items():
+            if name not in fields:
+                raise InputError(name, f"is no entry here{suggestion(name, fields)}", entry)
             if isinstance(entry, dict) and isinstance(part := getattr(self, name), Description):
                 entries[name] = part.updated(**entry)
         return self.model_copy(update=entries)

@@ -181,3 +181,11 @@ def test_of_many_names_those_are_listed_that_are_near():
     said = choices("joint_positon", many)
     assert said.startswith("joint_position, joint_velocity, power_of_")
     assert said.endswith("and 57 more; did you mean joint_position?")
+
+
+@pytest.mark.parametrize(
+    ("entries", "named"), [({"gravty": 1.0}, "gravity"), ({"tendon_friction": {"drg": 1}}, "drag")]
+)
+def test_updates_of_entries_that_there_are_not_are_refused_with_the_nearest_name(entries, named):
+    with pytest.raises(InputError, match=f"is no entry here; did you mean {named}"):
+        load_finger("ub").updated(**entries)
