@@ -21,7 +21,17 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from finger_pin.core.jit import CompiledFunction, Indices, Matrix, StructType, Vector, call_at, njit_inline, unpack
+from finger_pin.core.jit import (
+    CompiledFunction,
+    Indices,
+    Matrix,
+    StructType,
+    Vector,
+    call_at,
+    njit_inline,
+    njit_reassociate,
+    unpack,
+)
 
 #: Standard deviations of an innovation beyond which a reading is a jump.
 JUMP = 10.0
@@ -102,6 +112,15 @@ def _fill_map(args: FilterArgs) -> None:
             args.map[i, size + forces + c] = args.derivatives[i, parameters + c]
 
 
+@njit_reassociate
+def _dot(first: Vector, second: Vector) -> float:
+    """Return the sum of products of two arrays of one length, in any order."""
+    total = 0.0
+    for c in range(first.size):
+        total += first[c] * second[c]
+    return total
+
+
 @njit_inline
 def _propagate(args: FilterArgs) -> None:
     """Propagate P over a period."""
@@ -112,14 +131,15 @@ def _propagate(args: FilterArgs) -> None:
             product[i, c] = 0.0
         for k in range(wide):
             factor = args.map[i, k]
+            # The covariance of parameters is diagonal for good.
             if factor != 0.0:
-                for c in range(wide):
+                for c in range(wide if k < known else known):
                     product[i, c] += factor * p[k, c]
+                if k >= known:
+                    product[i, k] += factor * p[k, k]
     for i in range(size):
         for j in range(i + 1):
-            total = 0.0
-            for k in range(wide):
-                total += product[i, k] * args.map[j, k]
+            total = _dot(product[i], args.map[j])
             for u in range(args.input_variance.size):
                 total += args.derivatives[i, size + u] * args.input_variance[u] * args.derivatives[j, size + u]
             p[i, j] = p[j, i] = total
@@ -243,13 +263,14 @@ def spread(address: int, _time: float) -> int:
     """Fill what the covariance of the `FilterArgs` at an address says of signals, parameters and forces."""
     args = unpack(address, FILTER_ARGS)
     p, wide = args.covariance, args.covariance.shape[0]
+    slope = args.gain
     for s in range(args.signal_variance.size):
         total = 0.0
         for i in range(wide):
-            part = 0.0
-            for j in range(wide):
-                part += p[i, j] * args.slopes[s, args.columns[j]]
-            total += part * args.slopes[s, args.columns[i]]
+            slope[i] = args.slopes[s, args.columns[i]]
+        for i in range(wide):
+            if slope[i] != 0.0:
+                total += slope[i] * _dot(p[i], slope)
         args.signal_variance[s] = max(total, 0.0)
     for i in range(args.considered.size):
         total = 0.0

@@ -11,7 +11,12 @@ from finger_pin.description.loading import ParametrisedScenario
 from finger_pin.exceptions import InputError
 
 PERIOD = 1e-3
-KEYS = ("finger.joints.mcp.spring.stiffness", "finger.tendon_friction.coulomb", "finger.actuators.servo.spool_radius")
+KEYS = (
+    "finger.joints.mcp.spring.stiffness",
+    "finger.tendon_friction.coulomb",
+    "finger.actuators.servo.spool_radius",
+    "finger.tendons.flexor.crossings.pip.radius",
+)
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +35,10 @@ def with_changes(scenario, changes):
     family = ParametrisedScenario(scenario, KEYS)
     values = np.array(family.values)
     return [
-        (fp.Finger(family.with_values((values + change * values * np.eye(3)[k]).tolist()).finger), change * values[k])
+        (
+            fp.Finger(family.with_values((values + change * values * np.eye(len(KEYS))[k]).tolist()).finger),
+            change * values[k],
+        )
         for k, change in enumerate(changes)
     ]
 
@@ -45,7 +53,7 @@ def end(finger, x, inputs, force=None):
 
 def test_derivatives_by_inputs_forces_and_parameters_are_differences_of_runs(wound):
     scenario, finger, x, voltage = wound
-    periods = PeriodMap(finger, x, with_changes(scenario, [1e-6] * 3), rtol=1e-9, atol_scale=1e-9)
+    periods = PeriodMap(finger, x, with_changes(scenario, [1e-6] * len(KEYS)), rtol=1e-9, atol_scale=1e-9)
     periods.inputs[:] = voltage
     assert not periods.advance(PERIOD)
     scale, size = finger.layout.scales(), len(x)
@@ -53,11 +61,39 @@ def test_derivatives_by_inputs_forces_and_parameters_are_differences_of_runs(wou
     for axis in np.eye(3):
         expected.append((end(finger, x, voltage, 1e-2 * axis) - end(finger, x, voltage, -1e-2 * axis)) / 2e-2)
     for (up, step), (down, _) in zip(
-        with_changes(scenario, [1e-5] * 3), with_changes(scenario, [-1e-5] * 3), strict=True
+        with_changes(scenario, [1e-5] * len(KEYS)), with_changes(scenario, [-1e-5] * len(KEYS)), strict=True
     ):
         expected.append((end(up, x, voltage) - end(down, x, voltage)) / (2.0 * step))
     for column, slopes in zip(periods.derivatives[:, size:].T, expected, strict=True):
         assert np.abs((column - slopes) / scale).max() <= 1.5e-2 * np.abs(slopes / scale).max() + 1e-5
+
+
+def test_rates_and_tensions_by_inputs_and_parameters_are_differences_of_fingers(wound):
+    """Over a moment the state changes by its rate; only rows that a number changes are evaluated again."""
+    scenario, finger, x, voltage = wound
+    moment, size, names = 1e-9, len(x), ("tendon_tension", "spool_tension")
+    periods = PeriodMap(finger, x, with_changes(scenario, [1e-6] * len(KEYS)))
+    periods.inputs[:] = voltage
+    periods.watch(names)
+    slopes = periods.watched()[1].copy()
+    assert not periods.advance(moment)
+
+    def difference(up, down, step):
+        pairs = []
+        for other, inputs in (up, down):
+            signals = other.evaluate(x, inputs)
+            pairs.append((other.rhs(0.0, x, inputs), np.concatenate([signals[name] for name in names])))
+        return [(first - second) / step for first, second in zip(*pairs, strict=True)]
+
+    expected = [difference((finger, voltage + 1e-3), (finger, voltage - 1e-3), 2e-3)]
+    ups, downs = (with_changes(scenario, [change] * len(KEYS)) for change in (1e-5, -1e-5))
+    expected += [
+        difference((up, voltage), (down, voltage), 2.0 * step) for (up, step), (down, _) in zip(ups, downs, strict=True)
+    ]
+    at = size + np.r_[0, np.arange(4, 4 + len(KEYS))]
+    for column, (rate, tension) in zip(at, expected, strict=True):
+        np.testing.assert_allclose(periods.derivatives[:, column] / moment, rate, atol=2e-3 * np.abs(rate).max())
+        np.testing.assert_allclose(slopes[:, column], tension, rtol=1e-3, atol=1e-3)
 
 
 def test_derivatives_by_the_state_are_differences_of_runs(wound):

@@ -115,28 +115,33 @@ def _fill_law_arguments(
         rows[ROW.command, k] = work.command[structure.channel[k]] if structure.channel[k] >= 0 else 0.0
 
 
+@njit_inline
+def evaluate_rows(structure: Structure, parameters: Parameters, work: Work, g: int, begin: int, end: int) -> None:
+    """Evaluate the law of some rows of a group, with their inputs from outside and the forces of earlier rows."""
+    rows = work.rows
+    if structure.groups.fed[g]:
+        for k in range(begin, end):
+            rows[ROW.command, k] += _sum_of_terms(
+                structure, parameters, structure.input_start[k], structure.input_start[k + 1], work
+            )
+    if structure.groups.pressed[g]:
+        for k in range(begin, end):
+            load = _sum_of_terms(structure, parameters, structure.load_start[k], structure.load_start[k + 1], work)
+            if (parameters.has_tip_force or structure.contact_rows) and structure.joint_pin[k] >= 0:
+                rows[ROW.load, k] = _pin_load(structure, parameters, k, load, work)
+            else:
+                work.pull[k, 0] = load
+                rows[ROW.load, k] = abs(load)
+    call_value(structure.groups.value[g], rows, parameters.laws, begin, end)
+
+
 @njit_always_inline
 def _evaluate_laws(structure: Structure, parameters: Parameters, work: Work) -> None:
     """Evaluate the laws of all rows but contacts in their order, each with the forces of those before."""
-    rows = work.rows
     for g in range(structure.groups.first.size):
         begin, end = structure.groups.first[g], structure.groups.end[g]
-        if begin < structure.contact_rows:
-            continue
-        if structure.groups.fed[g]:
-            for k in range(begin, end):
-                rows[ROW.command, k] += _sum_of_terms(
-                    structure, parameters, structure.input_start[k], structure.input_start[k + 1], work
-                )
-        if structure.groups.pressed[g]:
-            for k in range(begin, end):
-                load = _sum_of_terms(structure, parameters, structure.load_start[k], structure.load_start[k + 1], work)
-                if (parameters.has_tip_force or structure.contact_rows) and structure.joint_pin[k] >= 0:
-                    rows[ROW.load, k] = _pin_load(structure, parameters, k, load, work)
-                else:
-                    work.pull[k, 0] = load
-                    rows[ROW.load, k] = abs(load)
-        call_value(structure.groups.value[g], rows, parameters.laws, begin, end)
+        if begin >= structure.contact_rows:
+            evaluate_rows(structure, parameters, work, g, begin, end)
 
 
 @njit_always_inline

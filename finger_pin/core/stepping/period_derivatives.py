@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from finger_pin.core.addresses.law_code import ROW
 from finger_pin.core.evaluation.condensation import solve
+from finger_pin.core.evaluation.rigid_body_dynamics import solve_mass
 from finger_pin.core.jit import (
     CompiledFunction,
     Matrix,
@@ -28,7 +29,17 @@ from finger_pin.core.jit import (
     njit_inline,
     unpack,
 )
-from finger_pin.core.stepping.period_evaluations import PERIOD_ARGS, PeriodArgs, evaluate_changed, evaluate_plain
+from finger_pin.core.stepping.period_evaluations import (
+    PERIOD_ARGS,
+    PeriodArgs,
+    change_rows,
+    evaluate_changed,
+    evaluate_plain,
+    held_parameters,
+    is_of_rows,
+    keep_rows,
+    restore_rows,
+)
 from finger_pin.core.stepping.period_kinks import cross_kinks
 from finger_pin.core.steps import integration as core
 from finger_pin.core.steps.interpolation import interpolate_share
@@ -42,18 +53,49 @@ _LEAST_SHARE, _SHARE = 0.459, 2.5
 
 
 @njit_inline
+def _fill_by_rows(period: PeriodArgs, plain: Model, c: int) -> None:
+    """Fill the derivatives of the rate by a number of what is held that acts by some rows alone."""
+    structure, work, held, kept = plain.structure, plain.work, period.held, period.plain_rows
+    bodies, width, change, step = structure.parents.size, work.torque.size, work.torque, period.steps[held.shape[0] + c]
+    for j in range(width):
+        change[j] = 0.0
+    for i in range(held.shape[0]):
+        held[i, c] = 0.0
+    arm, other_arm = plain.parameters.arm, held_parameters(period, plain, c).arm
+    change_rows(period, plain, c)
+    for r in range(period.range_start[c], period.range_start[c + 1]):
+        for k in range(period.row_ranges[r, 1], period.row_ranges[r, 2]):
+            whole = work.rows[ROW.force, k]
+            force = (whole - kept[ROW.force, k]) / step
+            for e in range(structure.arm_start[k], structure.arm_start[k + 1]):
+                change[structure.arm_at[e]] += work.arm[e] * force + (other_arm[e] - arm[e]) / step * whole
+            if structure.state[k] >= 0:
+                held[2 * width + structure.state[k], c] = (work.rows[ROW.rate, k] - kept[ROW.rate, k]) / step
+    restore_rows(period, plain, c)
+    solve_mass(structure, bodies, work, change)
+    for j in range(width):
+        if structure.prescribed[j] < 0:
+            held[width + j, c] = change[j] if j < bodies else change[j] / plain.parameters.lumps[j - bodies]
+
+
+@njit_inline
 def _fill_held(period: PeriodArgs, state: Vector) -> None:
-    """Fill b at a state: derivatives of the rate by inputs, forces and parameters."""
+    """Fill b at a state: derivatives of the rate by inputs, forces and parameters, those of rows alone first."""
     held, size = period.held, period.held.shape[0]
     plain = unpack(period.plain, MODEL)
     evaluate_plain(period.plain, state, True)
-    for i in range(size):
-        for c in range(held.shape[1]):
-            held[i, c] = plain.rate[i]
+    keep_rows(period, plain)
     for c in range(held.shape[1]):
-        changed = unpack(evaluate_changed(period, state, size + c, True), MODEL)
-        for i in range(size):
-            held[i, c] = (changed.rate[i] - held[i, c]) / period.steps[size + c]
+        if is_of_rows(period, c):
+            _fill_by_rows(period, plain, c)
+        else:
+            for i in range(size):
+                held[i, c] = plain.rate[i]
+    for c in range(held.shape[1]):
+        if not is_of_rows(period, c):
+            changed = unpack(evaluate_changed(period, state, size + c, True), MODEL)
+            for i in range(size):
+                held[i, c] = (changed.rate[i] - held[i, c]) / period.steps[size + c]
 
 
 @njit_inline
@@ -89,15 +131,20 @@ def _fill_inverse(linear: Linear, right: Vector, solution: Vector, inverse: Matr
 
 @njit_inline
 def _multiply(first: Matrix, second: Matrix, product: Matrix) -> None:
-    """Fill a product of matrices; entries of the first that are zero cost nothing."""
+    """Fill a product of matrices, by four rows of the second at a time: each reads and writes the product once."""
+    count = first.shape[1]
+    whole = count - count % 4
     for i in range(first.shape[0]):
+        of, out = first[i], product[i]
         for c in range(second.shape[1]):
-            product[i, c] = 0.0
-        for k in range(first.shape[1]):
-            factor = first[i, k]
-            if factor != 0.0:
-                for c in range(second.shape[1]):
-                    product[i, c] += factor * second[k, c]
+            out[c] = 0.0
+        for k in range(0, whole, 4):
+            for c in range(second.shape[1]):
+                out[c] += of[k] * second[k, c] + of[k + 1] * second[k + 1, c]
+                out[c] += of[k + 2] * second[k + 2, c] + of[k + 3] * second[k + 3, c]
+        for k in range(whole, count):
+            for c in range(second.shape[1]):
+                out[c] += of[k] * second[k, c]
 
 
 @njit_inline
@@ -191,17 +238,38 @@ def _sum_rows(period: PeriodArgs, address: int, signal: int) -> float:
     return total
 
 
+@njit_inline
+def _add_slopes(period: PeriodArgs, rows: Matrix, column: int, begin: int, end: int) -> None:
+    """Add to the derivatives of the signals that are watched what some rows differ by from those kept."""
+    weights, kept, step = period.weights_of_rows, period.plain_rows, period.steps[column]
+    for k in range(begin, end):
+        force = (rows[ROW.force, k] - kept[ROW.force, k]) / step
+        command = (rows[ROW.command, k] - kept[ROW.command, k]) / step
+        if force != 0.0 or command != 0.0:
+            for s in range(weights.shape[2]):
+                period.slopes[s, column] += weights[0, k, s] * force + weights[1, k, s] * command
+
+
 @CompiledFunction
 def fill_watched(address: int, _time: float) -> int:
     """Fill the signals that are watched of the `PeriodArgs` at an address, and their derivatives."""
     period = unpack(address, PERIOD_ARGS)
     state = unpack(unpack(period.args, core.ADVANCE_ARGS).integration, core.INTEGRATION).x
-    signals, source = period.watched.size, period.plain
-    evaluate_plain(source, state, False)
-    for s in range(signals):
-        period.watched[s] = _sum_rows(period, source, s)
+    plain, size = unpack(period.plain, MODEL), state.size
+    evaluate_plain(period.plain, state, False)
+    keep_rows(period, plain)
+    for s in range(period.watched.size):
+        period.watched[s] = _sum_rows(period, period.plain, s)
+        for c in range(period.steps.size):
+            period.slopes[s, c] = 0.0
+    for c in range(size, period.steps.size):
+        if is_of_rows(period, c - size):
+            change_rows(period, plain, c - size)
+            for r in range(period.range_start[c - size], period.range_start[c - size + 1]):
+                _add_slopes(period, plain.work.rows, c, period.row_ranges[r, 1], period.row_ranges[r, 2])
+            restore_rows(period, plain, c - size)
     for c in range(period.steps.size):
-        changed = evaluate_changed(period, state, c, False)
-        for s in range(signals):
-            period.slopes[s, c] = (_sum_rows(period, changed, s) - period.watched[s]) / period.steps[c]
+        if c < size or not is_of_rows(period, c - size):
+            changed = unpack(evaluate_changed(period, state, c, False), MODEL)
+            _add_slopes(period, changed.work.rows, c, 0, changed.work.rows.shape[1])
     return 1

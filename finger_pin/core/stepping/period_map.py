@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from finger_pin.core.steps import integration as core
 from finger_pin.core.tables.inputs import held_control
 from finger_pin.core.tables.islands import Island
 from finger_pin.core.tables.mechanism_parameters import Parameters, compile_mechanism
+from finger_pin.core.tables.structure import Structure
 from finger_pin.exceptions import InputError
 from finger_pin.laws.motor import MOTOR
 from finger_pin.mechanism.finger import Finger
@@ -114,6 +116,7 @@ class PeriodMap:
     def _arguments(self, advance: int, args: int, exact: bool, changes: Array) -> PeriodArgs:
         """Return the arguments of compiled code, with changes of what is held for differences, shape (m,)."""
         size, held = len(self.x), len(changes)
+        ranges, starts = self._row_ranges()
         return PeriodArgs(
             advance=advance,
             args=args,
@@ -130,12 +133,28 @@ class PeriodMap:
             state=np.zeros(size),
             gradient=np.zeros(size + held),
             steps=np.concatenate([_STATE_CHANGE * self.finger.layout.scales(), changes]),
+            row_ranges=ranges,
+            range_start=starts,
+            plain_rows=np.zeros_like(self._models[0].model.work.rows),
             weights_of_rows=np.zeros((2, len(self._structure.state), 0)),
             watched=np.zeros(0),
             slopes=np.zeros((0, size + held)),
             bristles=self._bristles(),
             levels=np.full(size, np.inf),
         )
+
+    def _row_ranges(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return ranges of rows that numbers of what is held change, if nothing else, and the first of each."""
+        structure, ranges, starts = self._structure, list[tuple[int, int, int]](), [0]
+        plain, *others = [each.model.parameters for each in self._models]
+        changed = [structure.channel == channel for channel in range(len(self.inputs))]
+        changed += [np.zeros(len(structure.state), dtype=bool)] * self.forces.size
+        changed += [_changed_rows(structure, plain, other) for other in others]
+        for rows in changed:
+            if not rows[: structure.contact_rows].any():
+                ranges += _dependent_ranges(structure, rows)
+            starts.append(len(ranges))
+        return np.array(ranges, dtype=np.int64).reshape(-1, 3), np.array(starts, dtype=np.int64)
 
     def _input_changes(self) -> Array:
         """Return by how much inputs are changed for differences, shape (u,)."""
@@ -238,3 +257,35 @@ class PeriodMap:
         """
         fill_watched(self.address)
         return self._args.watched, self._args.slopes
+
+
+def _same(first: Any, second: Any) -> bool:
+    """Return whether all numbers of two tables are the same."""
+    if isinstance(first, tuple):
+        return all(_same(*pair) for pair in zip(first, second, strict=True))
+    return np.array_equal(first, second)
+
+
+def _changed_rows(structure: Structure, first: Parameters, second: Parameters) -> NDArray[np.bool_]:
+    """Return which rows have other numbers, shape (K,); none where bodies, tips or paths have."""
+    fields = ("laws", "arm", "measure", "weights")
+    if not _same(first, second._replace(**{name: getattr(first, name) for name in fields})):
+        return np.zeros(len(structure.state), dtype=bool)
+    rows = np.any(first.laws != second.laws, axis=0)
+    rows[structure.arm_row[(first.arm != second.arm) | (first.measure != second.measure)]] = True
+    for starts in (structure.input_start, structure.load_start):
+        for k in range(len(rows)):
+            rows[k] |= np.any((first.weights != second.weights)[starts[k] : starts[k + 1]])
+    return rows
+
+
+def _dependent_ranges(structure: Structure, rows: NDArray[np.bool_]) -> Iterator[tuple[int, int, int]]:
+    """Yield group, first row and last + 1 of rows that are marked, shape (K,), and of all that they feed or load."""
+    rows = rows.copy()
+    for k in range(len(rows)):
+        for starts in (structure.input_start, structure.load_start):
+            rows[k] |= rows[structure.terms[starts[k] : starts[k + 1]]].any()
+    for g, (first, end) in enumerate(zip(structure.groups.first, structure.groups.end, strict=True)):
+        edges = np.flatnonzero(np.diff(rows[first:end].astype(int), prepend=0, append=0))
+        for begin, stop in edges.reshape(-1, 2):
+            yield g, first + begin, first + stop
