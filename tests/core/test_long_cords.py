@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import finger_pin as fp
+from finger_pin.core.signals.compiled_finger import CompiledFinger
 from finger_pin.core.signals.rate_derivatives import rate_derivatives
 
 JOINTS = 6
@@ -52,3 +53,13 @@ def test_the_rate_of_a_chain_of_joints_has_the_derivatives_that_its_differences_
     # Of bends where nothing slides, differences are rounding.
     scale = np.maximum(np.abs(differences).max(axis=1, keepdims=True), 1.0)
     np.testing.assert_allclose(found / scale, differences / scale, atol=2e-6)
+
+
+def test_bends_of_a_cord_are_those_of_each_posture_evaluated():
+    description = fp.from_mujoco(mujoco.MjSpec.from_string(chain(False)))
+    finger = fp.Finger(description.updated(tendon_friction=FRICTION | {"place": "bends"}))
+    rng, pull = np.random.default_rng(8), np.array([3.0, 2.0])
+    x = np.array([finger.rest_state(rng.uniform(-0.6, 0.6, JOINTS), rng.normal(size=JOINTS)) for _ in range(3)])
+    x = x + 1e-3 * rng.normal(size=x.shape)
+    found = CompiledFinger(finger).evaluate(x, np.tile(pull, (3, 1))).rate
+    np.testing.assert_allclose(found, [finger.rhs(0.0, row, pull) for row in x], rtol=1e-8)

@@ -132,8 +132,10 @@ def factorise(matrix: Matrix, size: int, pivots: Indices) -> bool:
         for r in range(c + 1, size):
             factor = matrix[r, c] * inverse
             matrix[r, c] = factor
-            for k in range(c + 1, size):
-                matrix[r, k] -= factor * matrix[c, k]
+            # Slices, whose indices are not negative, let the compiler use vector instructions.
+            row, above = matrix[r, c + 1 :], matrix[c, c + 1 :]
+            for k in range(size - c - 1):
+                row[k] -= factor * above[k]
     return True
 
 

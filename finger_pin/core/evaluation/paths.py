@@ -21,7 +21,7 @@ from finger_pin.core.tables.buffers import Work
 from finger_pin.core.tables.mechanism_parameters import Parameters
 from finger_pin.core.tables.model import MODEL
 from finger_pin.core.tables.path_movers import PIECE
-from finger_pin.core.tables.path_tables import WRENCH, PathParameters, PathStructure
+from finger_pin.core.tables.path_tables import WRENCH, PathParameters, PathStructure, PathWork
 from finger_pin.core.tables.structure import Structure
 from finger_pin.mechanism.gaps.signed_distance import GAP_OUT, POINT
 from finger_pin.mechanism.spans.span import COINCIDENT, SPAN_OUT
@@ -54,16 +54,17 @@ def _frame(paths: PathStructure, geometry: PathParameters, e: int, work: Work) -
     for p in range(2 + paths.thirds[e]):
         body = paths.bodies[e, PIECE.third if p == 2 else p]
         for r in range(3):
-            ends[3 * p + r] = geometry.points[e, 3 * p + r]
-        if body >= 0:
-            for r in range(3):
-                ends[3 * p + r] = work.origin[body, r]
+            value = geometry.points[e, 3 * p + r]
+            if body >= 0:
+                value = work.origin[body, r]
                 for i in range(3):
-                    ends[3 * p + r] += work.rotation[body, r, i] * geometry.points[e, 3 * p + i]
+                    value += work.rotation[body, r, i] * geometry.points[e, 3 * p + i]
+            ends[3 * p + r] = value
         for c in range(3):
-            pieces.local_points[e, 3 * p + c] = 0.0
+            value = 0.0
             for r in range(3):
-                pieces.local_points[e, 3 * p + c] += rotation[r, c] * (ends[3 * p + r] - origin[r])
+                value += rotation[r, c] * (ends[3 * p + r] - origin[r])
+            pieces.local_points[e, 3 * p + c] = value
 
 
 @njit_inline
@@ -92,8 +93,16 @@ def look_at(paths: PathStructure, geometry: PathParameters, e: int, work: Work) 
 
 
 @njit_inline
+def net_wrench(moves: Indices, wrench: Vector, out: Vector) -> None:
+    """Fill the wrench on all of the three bodies that a coordinate moves."""
+    first, second = 1.0 * (moves[0] - moves[2]), 1.0 * (moves[1] - moves[2])
+    for i in range(6):
+        out[i] = first * wrench[i] + second * wrench[6 + i]
+
+
+@njit_inline
 def _measure(paths: PathStructure, geometry: PathParameters, e: int, work: Work) -> None:
-    """Fill the value of a piece, and its wrenches."""
+    """Fill the value of a piece, its wrenches and arms; forget the corner before it."""
     pieces = work.paths
     look_at(paths, geometry, e, work)
     out, columns = pieces.out[e], paths.columns[e]
@@ -105,6 +114,7 @@ def _measure(paths: PathStructure, geometry: PathParameters, e: int, work: Work)
         for i in range(WRENCH):
             pieces.wrench[e, m, i] = 0.0
     if columns == 1:
+        pieces.before[e] = -1
         wrench = pieces.wrench[e, 0]
         for p in range(2):
             turn_out(rotation, out, SPAN_OUT.first_pull + 3 * p, wrench[6 * p + 3 : 6 * p + 6])
@@ -120,14 +130,11 @@ def _measure(paths: PathStructure, geometry: PathParameters, e: int, work: Work)
             wrench = pieces.wrench[e, m]
             turn_out(rotation, out, GAP_OUT.normal if m == 0 else GAP_OUT.first_tangent + 3 * (m - 1), wrench[3:6])
             add_moment(point, wrench[3:6], wrench[:3])
-
-
-@njit_inline
-def net_wrench(moves: Indices, wrench: Vector, out: Vector) -> None:
-    """Fill the wrench on all of the three bodies that a coordinate moves."""
-    first, second = 1.0 * (moves[0] - moves[2]), 1.0 * (moves[1] - moves[2])
-    for i in range(6):
-        out[i] = first * wrench[i] + second * wrench[6 + i]
+    net = work.vectors[0]
+    for r in range(paths.start[e], paths.start[e] + paths.acting[e]):
+        for m in range(columns):
+            net_wrench(paths.moves[r], pieces.wrench[e, m], net)
+            pieces.arm[r, m] = dot(work.spatial.axis[paths.at[r]], net)
 
 
 @njit_inline
@@ -138,6 +145,15 @@ def angle_between(first: Vector, second: Vector) -> tuple[float, float]:
     y = first[2] * second[0] - first[0] * second[2]
     z = first[0] * second[1] - first[1] * second[0]
     return cosine, np.sqrt(x * x + y * y + z * z)
+
+
+@njit_inline
+def _corner(pieces: PathWork, before: int, e: int) -> float:
+    """Return the angle between two pieces of a path, computed once for all rows of a cord."""
+    if pieces.before[e] != before:
+        cosine, sine = angle_between(pieces.wrench[before, 0, 9:12], pieces.wrench[e, 0, 3:6])
+        pieces.before[e], pieces.corner[e] = before, np.arctan2(sine, cosine)
+    return pieces.corner[e]
 
 
 @CompiledFunction
@@ -171,7 +187,7 @@ def measure_paths(structure: Structure, parameters: Parameters, work: Work) -> N
     pieces.closed_count[0] = closed
     for e in range(first // arms, paths.columns.size):
         _measure(paths, geometry, e, work)
-    axes, gather, net = work.spatial.axis, pieces.gather, work.vectors[0]
+    gather = pieces.gather
     for at in range(arms * closed + paths.rows.size - first):
         # The rows of contacts are their places, too.
         index = at - arms * closed + first
@@ -194,12 +210,10 @@ def measure_paths(structure: Structure, parameters: Parameters, work: Work) -> N
             before, bends = (before, bends or paths.bends[leg] > 0) if paths.follows[leg] else (-1, False)
             if paths.columns[e] == 1 and pieces.out[e, SPAN_OUT.length] > COINCIDENT:
                 if before >= 0 and bends:
-                    cosine, sine = angle_between(pieces.wrench[before, 0, 9:12], pieces.wrench[e, 0, 3:6])
-                    turn += np.arctan2(sine, cosine)
+                    turn += _corner(pieces, before, e)
                 before, bends = e, False
             for r in range(paths.start[e], paths.start[e] + paths.acting[e]):
-                net_wrench(paths.moves[r], pieces.wrench[e, m], net)
-                gather[paths.at[r]] += geometry.weight[leg] * dot(axes[paths.at[r]], net)
+                gather[paths.at[r]] += geometry.weight[leg] * pieces.arm[r, m]
         for a in range(begin, end):
             j = structure.arm_at[a]
             work.arm[a] += gather[j]

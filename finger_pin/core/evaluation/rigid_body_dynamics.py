@@ -149,16 +149,14 @@ def inverse_dynamics(
 
 @njit_always_inline
 def mass_matrix(structure: Structure, parameters: Parameters, work: Work) -> None:
-    """Fill work.mass_matrix = M after `move`; entries between trees are zero from the start."""
+    """Fill the lower half of work.mass_matrix = M after `move`; entries between trees are zero from the start."""
     size = structure.parents.size
     for i in range(size):
         momentum = work.spatial.momentum[i]
         apply_inertia(work.composite[i], work.spatial.axis[i], momentum)
         j = i
         while j >= 0:
-            value = dot(work.spatial.axis[j], momentum)
-            work.mass_matrix[i, j] = value
-            work.mass_matrix[j, i] = value
+            work.mass_matrix[i, j] = dot(work.spatial.axis[j], momentum)
             j = structure.parents[j]
         work.mass_matrix[i, i] += parameters.bodies[i, BODY.armature]
 
@@ -174,16 +172,17 @@ def factorise_mass(structure: Structure, size: int, work: Work) -> None:
         for c in range(structure.roots[i], i + 1):
             factor[i, c] = work.mass_matrix[i, c]
     for j in range(size - 1, -1, -1):
-        root, inverse, row = structure.roots[j], 1.0 / factor[j, j], factor[j]
-        i = structure.parents[j]
+        # Slices, whose indices are not negative, let the compiler use vector instructions.
+        root, inverse = structure.roots[j], 1.0 / factor[j, j]
+        row, i = factor[j, root:], structure.parents[j]
         while i >= 0:
-            share, above = row[i] * inverse, factor[i]
-            for c in range(root, i + 1):
+            share, above = factor[j, i] * inverse, factor[i, root:]
+            for c in range(i + 1 - root):
                 above[c] -= share * row[c]
             i = structure.parents[i]
-        for c in range(root, j):
+        for c in range(j - root):
             row[c] *= inverse
-        row[j] = inverse
+        factor[j, j] = inverse
 
 
 @njit_always_inline
@@ -191,9 +190,10 @@ def solve_mass(structure: Structure, size: int, work: Work, vector: Vector) -> N
     """Replace a vector by M^-1 vector after `factorise_mass`."""
     factor = work.mass_factor
     for j in range(size - 1, -1, -1):
-        value, row = vector[j], factor[j]
-        for c in range(structure.roots[j], j):
-            vector[c] -= row[c] * value
+        value, root = vector[j], structure.roots[j]
+        row, part = factor[j, root:], vector[root:]
+        for c in range(j - root):
+            part[c] -= row[c] * value
     for j in range(size):
         value, row = vector[j] * factor[j, j], factor[j]
         for c in range(structure.roots[j], j):

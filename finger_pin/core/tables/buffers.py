@@ -43,7 +43,7 @@ class Work(NamedTuple):
         base_velocity, base_acceleration: Of the base, less gravity, in its own axes, shape (6,).
         base_rate: Their rates, shape (2, 6).
         base_power: Power of the base, shape (1,), W.
-        mass_matrix, mass_factor: M, and the factors of `factorise_mass`, shape (n, n).
+        mass_matrix, mass_factor: M, its lower half, and the factors of `factorise_mass`, shape (n, n).
         by_position, by_velocity: Derivatives of inverse dynamics, shape (n, n).
         rows: Arguments and results of the rows' laws, shape (columns, K); columns `ROW`.
         slopes: Derivatives of the laws, shape (columns, K); columns `SLOPE`, of contacts `TOUCH_SLOPE`.

@@ -55,9 +55,7 @@ class PathStructure(NamedTuple):
         carries: One where a body carries another, shape (n, n).
         rows: Rows with paths, shape (R,).
         leg_start: First index of their legs, shape (R + 1,).
-        piece: Of each leg, shape (L,).
-        column: Of each leg, shape (L,).
-        follows: Of each leg, shape (L,).
+        piece, column, follows: Of each leg, shape (L,).
         bends: Whether each leg's turn counts, shape (L,).
     """
 
@@ -121,17 +119,13 @@ class PathWork(NamedTuple):
     Attributes:
         out: Numbers of the shapes, columns `GAP_OUT` or `SPAN_OUT`, shape (E, columns).
         active: Zero for gaps that are open, shape (E,).
-        active_pairs: Contact pairs that are not culled, in order, shape (E,).
-        active_pair_count: Their number, shape (1,).
-        live: From where to where numbers of the state may be other than zero, as states of culled contacts are not,
-            shape (2 + contact pairs, 2); kept from step to step.
-        live_count: Their number, shape (1,).
-        closed: Gaps that are not open, in order, shape (E,).
-        closed_count: Their number, shape (1,).
+        active_pairs, active_pair_count: Contact pairs that are not culled, in order, shape (E,), and how many.
+        live, live_count: From where to where numbers of the state may be other than zero, as those of culled contacts
+            are not, shape (2 + contact pairs, 2), and how many parts, shape (1,); kept from step to step.
+        closed, closed_count: Gaps that are not open, in order, shape (E,), and their number, shape (1,).
         culled: One for the rows of a contact that is at rest and too far away to close, shape (K,); kept from step to
             step, as the next.
-        clear: No more than the gap of every piece where the step began, shape (E,), m.
-        ahead: Likewise, where it ends.
+        clear, ahead: No more than the gap of every piece where the step began, and where it ends, shape (E,), m.
         path: Bound of the path of a gap's bodies against each other in a step, shape (E,), m.
         far: Largest distance of the first body's core from the origin of the second's frame, where the step began,
             shape (E,), m.
@@ -141,13 +135,13 @@ class PathWork(NamedTuple):
         travel: Path of each coordinate, to and fro, in a step, shape (N,).
         control: Bernstein coefficients of its motion, shape (N, 5).
         looks: Moments of a step, and what was seen there of a gap, columns `LOOK`, shape (LOOKS, columns).
-        frame: Rotation of each piece's frame in the base's, shape (E, 3, 3).
-        origin: Its origin, shape (E, 3), m.
+        frame, origin: Rotation of each piece's frame in the base's, shape (E, 3, 3), and its origin, shape (E, 3), m.
         ends: Both points and the third one, base frame, shape (E, 9), m.
         wrench: Unit wrenches on the first and on the second body, shape (E, most wrenches, WRENCH).
+        arm: Arm of each wrench about the coordinates that act on its piece, shape (entries, most wrenches).
+        before, corner: Piece of a path before each and the angle between both, rad; -1 if not known, shape (E,).
         push: Force of a contact on the first body, shape (E, 3), N.
-        length: Of every row, shape (K,).
-        turn: Of every row, shape (K,).
+        length, turn: Of every row, shape (K,).
         local_points: All three points in the piece's frame, shape (E, 9), m.
         gather: Shape (N,).
         slopes: Of a shape, columns `GAP_SLOPE` or `SPAN_SLOPE`.
@@ -180,6 +174,9 @@ class PathWork(NamedTuple):
     origin: Matrix
     ends: Matrix
     wrench: Layers
+    arm: Matrix
+    before: Indices
+    corner: Vector
     push: Matrix
     length: Vector
     turn: Vector
@@ -289,6 +286,9 @@ def build_path_work(paths: PathStructure, count: int, width: int, size: int) -> 
         origin=np.zeros((pieces, 3)),
         ends=np.zeros((pieces, 9)),
         wrench=np.zeros((pieces, columns, WRENCH)),
+        arm=np.zeros((entries, columns)),
+        before=np.full(pieces, -1),
+        corner=np.zeros(pieces),
         push=np.zeros((pieces, 3)),
         length=np.zeros(count),
         turn=np.zeros(count),
