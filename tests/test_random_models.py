@@ -4,9 +4,10 @@ import pytest
 from random_models import FEATURES, random_model
 from random_table import DOORS
 
-# Every door has a model of its own, and one of bristles 1e-6 N m from a kink, across which derivatives were taken.
+# Every door has a model of its own; one has bristles 1e-6 N m from a kink, across which derivatives were taken, and one
+# a cord that gets taut within 1e-9 s, in which bristles turn over.
 CASES = [(name, 100 * index) for index, name in enumerate(DOORS)]
-CASES += [("linearise = differences", 43)]
+CASES += [("linearise = differences", 43), ("linearise over a step = differences", 50026)]
 
 
 @pytest.mark.slow

@@ -9,8 +9,9 @@ which is of order p in g h: with s = g h, exp(s (W - 1) / W) = sum of L_k(s) (1 
 Laguerre polynomials L_k of parameter -1, and the last c makes the sum zero where W is, which damps what is stiff. J and
 b are those of the step's start: what they change within the step is the error, of first order in h. Where derivatives
 are to be exact, the first sixth of a step has those of its start, the next two thirds those of its middle, and the last
-those of its end, on the branches of kinks on which it was taken: Simpson's rule for what they change. Steps end where
-the motion passes a kink; `period_kinks` has what derivatives gain there.
+those of its end, on the branches of kinks on which it was taken: Simpson's rule for what they change. Where that rule
+misses a part of the way that the state goes, as laws may bend where no step ends, the step is halved until it does not.
+Steps end where the motion passes a kink; `period_kinks` has what derivatives gain there.
 """
 
 from __future__ import annotations
@@ -40,9 +41,8 @@ from finger_pin.core.stepping.period_evaluations import (
     keep_rows,
     restore_rows,
 )
-from finger_pin.core.stepping.period_kinks import cross_kinks
+from finger_pin.core.stepping.period_kinks import LEAST_PART, bends, cross_kinks, reach
 from finger_pin.core.steps import integration as core
-from finger_pin.core.steps.interpolation import interpolate_share
 from finger_pin.core.tables.linear_systems import Linear
 from finger_pin.core.tables.model import MODEL, Model
 
@@ -174,17 +174,21 @@ def _propagate(period: PeriodArgs, integration: core.Integration, model: Model, 
         _fill_inverse(model.linear, period.right, integration.end, period.inverse)
         _apply(period, model.linear, step)
         return True
-    for node in range(3):
-        length, time = step * (2.0 if node == 1 else 0.5) / 3.0, integration.memory.time[0] - (1.0 - 0.5 * node) * step
-        interpolate_share(period.start, integration.x, integration.dense, 0.5 * node, period.state)
-        copy(period.state, model.state)
-        call_at(model.evaluate, integration.model, time)
-        call_at(model.linearise, integration.model, time)
-        if call_at(model.condense, integration.model, _SHARE / length) == 0:
-            return False
-        _fill_inverse(model.linear, period.right, integration.end, period.inverse)
-        _fill_held(period, period.state)
-        _apply(period, model.linear, length)
+    begin, part = 0.0, 1.0
+    while begin < 1.0 - LEAST_PART:
+        part = min(part, 1.0 - begin)
+        while part > LEAST_PART and bends(period, integration, model, step, begin, part):
+            part *= 0.5
+        for node in range(3):
+            length = step * part * (2.0 if node == 1 else 0.5) / 3.0
+            time = reach(period, integration, model, step, begin + 0.5 * node * part)
+            call_at(model.linearise, integration.model, time)
+            if call_at(model.condense, integration.model, _SHARE / length) == 0:
+                return False
+            _fill_inverse(model.linear, period.right, integration.end, period.inverse)
+            _fill_held(period, period.state)
+            _apply(period, model.linear, length)
+        begin, part = begin + part, 2.0 * part
     return True
 
 

@@ -16,11 +16,47 @@ from finger_pin.core.addresses.law_code import ROW
 from finger_pin.core.jit import call_at, copy, njit_always_inline, njit_inline, unpack
 from finger_pin.core.stepping.period_evaluations import PeriodArgs, evaluate_changed, evaluate_plain
 from finger_pin.core.steps import integration as core
+from finger_pin.core.steps.interpolation import interpolate_share
 from finger_pin.core.tables.model import MODEL, Model
 
 # Least jump of a rate that counts, in changes of the state for differences, per s: where derivatives are to be exact,
 # and elsewhere.
 _LEAST_JUMP, _LEAST_ROUGH_JUMP = 1.0, 1e7
+# What Simpson's rule for the rate may miss, of the way that a number of the state goes, and of its change for
+# differences, which is rounding.
+_MISS, _ROUNDING = 1e-6, 1e-9
+#: Least part of a step: as near as its end is behind a kink.
+LEAST_PART = 1e-4
+
+
+@njit_always_inline
+def reach(period: PeriodArgs, integration: core.Integration, model: Model, step: float, share: float) -> float:
+    """Evaluate a model at a share of a step that has just been taken; return the time there, s."""
+    time = integration.memory.time[0] - (1.0 - share) * step
+    interpolate_share(period.start, integration.x, integration.dense, share, period.state)
+    copy(period.state, model.state)
+    call_at(model.evaluate, integration.model, time)
+    return time
+
+
+@njit_always_inline
+def bends(
+    period: PeriodArgs, integration: core.Integration, model: Model, step: float, begin: float, part: float
+) -> bool:
+    """Return whether Simpson's rule for the rate misses a part of a step, as where a law bends unseen within it."""
+    miss, way, size = period.right, period.gradient, period.start.size
+    for i in range(size):
+        miss[i] = way[i] = 0.0
+    for node in range(3):
+        weight, sign = step * part * (4.0 if node == 1 else 1.0) / 6.0, node - 1.0
+        reach(period, integration, model, step, begin + 0.5 * node * part)
+        for i in range(size):
+            miss[i] += weight * model.rate[i] - sign * model.state[i]
+            way[i] += weight * abs(model.rate[i])
+    for i in range(size):
+        if abs(miss[i]) > _MISS * way[i] + _ROUNDING * period.steps[i]:
+            return True
+    return False
 
 
 @njit_inline
