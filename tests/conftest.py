@@ -105,7 +105,7 @@ def reversals():
 def coarse_sections():
     """Sections of forces in few directions, each of which is a linear programme or more."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("finger_pin.views.plots.fingertip_forces._DIRECTIONS", 12)
+        patch.setattr("finger_pin.views.plots.statics._DIRECTIONS", 12)
         yield
 
 

@@ -12,7 +12,7 @@ from finger_pin.exceptions import InputError
 from finger_pin.observation.record import CONSISTENCY_LIMIT
 from finger_pin.simulation.netcdf import require_samples
 from finger_pin.views.shown_units import joints_by_unit
-from finger_pin.views.summary import table
+from finger_pin.views.summary import number_row, table
 
 # From this part of a sensor's readings on, those that were used say little of the model.
 _MANY = 0.1
@@ -75,7 +75,6 @@ def summarize_observed(result: xr.Dataset) -> str:
     """
     require_observation(result)
     time, attributes = result["time"].values, result.attrs
-    kept = f", every {attributes['stride']}th kept" if attributes["stride"] > 1 else ""
     head = f"{attributes['name']}: {time[0]:.6g} s to {time[-1]:.6g} s observed"
     kept = f", every {attributes['stride']}th kept" if attributes["stride"] > 1 else ""
     steps = f"steps of {1e3 * attributes['period']:g} ms, bands of {100.0 * attributes['level']:g} %"
@@ -90,11 +89,8 @@ def summarize_observed(result: xr.Dataset) -> str:
                 rows = [_row(str(each), result.sel(tendon=each), name, 1.0, 3) for each in result["tendon"].values]
                 blocks.append(_banded(f"Tension {title}, N", rows))
     told = [_touches(result), _consistency(result), *_dropped(result), _speed(result)]
-    return "\n\n".join("\n".join(block) for block in [*blocks, [line for each in told for line in _wrapped(each)]])
-
-
-def _wrapped(text: str) -> list[str]:
-    return textwrap.wrap(text, 80, subsequent_indent="  ")
+    blocks.append([line for each in told for line in textwrap.wrap(each, 80, subsequent_indent="  ")])
+    return "\n\n".join("\n".join(block) for block in blocks)
 
 
 def _banded(title: str, rows: list[tuple[str, ...]]) -> list[str]:
@@ -103,9 +99,7 @@ def _banded(title: str, rows: list[tuple[str, ...]]) -> list[str]:
 
 def _row(name: str, part: xr.Dataset, variable: str, factor: float, digits: int) -> tuple[str, ...]:
     values, low, high = (factor * part[f"{variable}{end}"].values for end in ("", "_low", "_high"))
-    # Adding zero turns what rounds to -0.0 into 0.0.
-    numbers = (round(float(each), digits) + 0.0 for each in (values.min(), values.max(), 0.5 * np.mean(high - low)))
-    return name, *(f"{each:.{digits}f}" for each in numbers)
+    return number_row(name, (values.min(), values.max(), 0.5 * np.mean(high - low)), digits)
 
 
 def _touches(result: xr.Dataset) -> str:

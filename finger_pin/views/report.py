@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from html import escape
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -32,12 +33,9 @@ _CORRELATION_DEVIATIONS = 3.0
 
 def summarize_identification(result: xr.Dataset) -> str:
     """Return the table of an identification as text."""
-    rows = [("", "estimate", "lower", "upper", "")]
-    rows += _parameters(result)
-    rows.append(("", "", "", "", ""))
-    rows.append(("", "rms", "samples", "of them", ""))
-    for name, noise, count, independent, unit in _signals(result):
-        rows.append((name, noise, count, f"{independent} free", unit))
+    rows: list[tuple[str, ...]] = [("", "estimate", "lower", "upper", ""), *_parameters(result)]
+    rows += [("", "", "", "", ""), ("", "rms", "samples", "of them", "")]
+    rows += [(*row, f"{independent} free", unit) for *row, independent, unit in _signals(result)]
     width = max(len(row[0]) for row in rows)
     doubts = [line for doubt in _doubts(result) for line in (doubt, "")]
     lines = [
@@ -57,18 +55,17 @@ def write_report(result: xr.Dataset, path: str | Path) -> Path:
     sections = [
         (
             "What was found",
-            "".join(f"<p class='doubt'><strong>{escape(doubt)}</strong></p>" for doubt in _doubts(result))
+            _paragraphs(_doubts(result), "<p class='doubt'><strong>{}</strong></p>")
             + _table(["parameter", "estimate", "lower (95 %)", "upper (95 %)", "unit"], _parameters(result))
             + profiles,
         ),
-        ("What the recordings leave open", "".join(f"<p>{escape(line)}</p>" for line in _remarks(result))),
+        ("What the recordings leave open", _paragraphs(_remarks(result))),
         (
             "How well every signal is met",
             _table(head, _signals(result)) + image(plot_identification(result), "Signals"),
         ),
     ]
-    predictions = "".join(f"<p>{escape(line)}</p>" for line in _predictions(result))
-    if predictions:
+    if predictions := _paragraphs(_predictions(result)):
         sections.insert(1, ("What was predicted", predictions + image(plot_predictions(result), "Predictions")))
     if "law" in result.dims:
         sections.append(("Which law", _law_table(result)))
@@ -77,6 +74,15 @@ def write_report(result: xr.Dataset, path: str | Path) -> Path:
     body = "".join(f"<section><h2>{title}</h2>{content}</section>" for title, content in sections)
     write_text(path, document(f"Identification: {result.attrs['scenario']}", body))
     return Path(path)
+
+
+def _paragraphs(sentences: Sequence[str], form: str = "<p>{}</p>") -> str:
+    return "".join(form.format(escape(sentence)) for sentence in sentences)
+
+
+def _rows(result: xr.Dataset, *columns: str) -> Iterator[tuple[Any, ...]]:
+    """Return the values of variables along their dimension, together."""
+    return zip(*(result[column].values for column in columns), strict=True)
 
 
 _PROFILES_NOTE = (
@@ -97,10 +103,10 @@ def _parameters(result: xr.Dataset) -> list[tuple[str, str, str, str, str]]:
 
 
 def _signals(result: xr.Dataset) -> list[tuple[str, str, str, str, str]]:
-    columns = ("signal", "noise", "signal_samples", "independent_share", "signal_units")
+    rows = _rows(result, "signal", "noise", "signal_samples", "independent_share", "signal_units")
     return [
         (str(name), f"{noise:.3g}", str(count), f"{share * count:.0f}", str(unit))
-        for name, noise, count, share, unit in zip(*(result[column].values for column in columns), strict=True)
+        for name, noise, count, share, unit in rows
     ]
 
 
@@ -141,7 +147,7 @@ def _predictions(result: xr.Dataset) -> list[str]:
     if "prediction" not in result.dims:
         return []
     columns = ("rms", "bias", "within", "band_ratio", "scatter", "beyond", "samples", "units")
-    rows = zip(result["prediction"].values, *(result[f"prediction_{column}"].values for column in columns), strict=True)
+    rows = _rows(result, "prediction", *(f"prediction_{column}" for column in columns))
     sentences = []
     for name, rms, bias, within, ratio, scatter, beyond, count, unit in rows:
         band = f", {within:.0%} of {count} samples within the 95 % band, half of which is {ratio:.2g} times 1.96 rms"
@@ -162,9 +168,7 @@ def _bound_text(value: float) -> str:
 
 def _remarks(result: xr.Dataset) -> list[str]:
     """Return sentences on open questions, agreement of the searches, and the law to be preferred."""
-    undetermined = (
-        [str(name) for name in np.atleast_1d(result.attrs["undetermined"])] if "undetermined" in result.attrs else []
-    )
+    undetermined = np.atleast_1d(result.attrs.get("undetermined", ""))
     sentences = [f"Not determined: {name}." for name in undetermined if name]
     for name, _, low, high, _ in _parameters(result):
         sides = [side for side, end in (("below", low), ("above", high)) if end == "open"]
@@ -201,9 +205,8 @@ def _misfit_remarks(result: xr.Dataset) -> tuple[list[str], bool]:
     sentences, correlated, law_holds = [], list[str](), True
     significance = result["lack_of_fit"].attrs.get("significance", 0.01)  # results before 0.7 do not say it
     columns = ("signal", "replicate_noise", "noise", "lack_of_fit", "signal_correlation", "signal_samples")
-    for name, repeats, noise, chance, correlation, count, steady in zip(
-        *(result[column].values for column in (*columns, "signal_steady")), strict=True
-    ):
+    rows = _rows(result, *columns, "signal_steady")
+    for name, repeats, noise, chance, correlation, count, steady in rows:
         if math.isfinite(repeats):
             kind = "Equal readings" if steady else "Repeated runs"
             sentences.append(f"{kind} of {name} differ by {repeats:.3g} rms, all from the law by {noise:.3g}.")
@@ -255,7 +258,7 @@ def _disagreements(result: xr.Dataset) -> list[str]:
 
 def _agreement(result: xr.Dataset) -> str:
     """Return a sentence on the agreement of the searches."""
-    agreeing, count = int(result.attrs["searches_alike"]), int(result.attrs["searches"])
+    agreeing, count = result.attrs["searches_alike"], result.attrs["searches"]
     if count == 1:
         return "There was one search: whether the recordings are met better elsewhere is not known."
     if _confirmed(result):
@@ -269,8 +272,8 @@ def _agreement(result: xr.Dataset) -> str:
 
 def _confirmed(result: xr.Dataset) -> bool:
     """Return whether the best minimum was found by at least two searches and by half of them, or by the only one."""
-    agreeing, count = int(result.attrs["searches_alike"]), int(result.attrs["searches"])
-    return count == 1 or (agreeing >= 2 and 2 * agreeing >= count)
+    agreeing, count = result.attrs["searches_alike"], result.attrs["searches"]
+    return bool(count == 1 or (agreeing >= 2 and 2 * agreeing >= count))
 
 
 def _table(header: Sequence[str], rows: Sequence[tuple[str, ...]]) -> str:
@@ -286,14 +289,12 @@ def _law_table(result: xr.Dataset) -> str:
     columns = ("law", "law_parameters", "law_bic", "law_rms", "law_held_out")
     rows = [
         (str(name), str(count), f"{bic:.1f}", f"{rms:.3f}", "-" if math.isnan(held_out) else f"{held_out:.3f}")
-        for name, count, bic, rms, held_out in zip(*(result[column].values for column in columns), strict=True)
+        for name, count, bic, rms, held_out in _rows(result, *columns)
     ]
     header = ["law", "parameters", "BIC (less is better)", "rms over noise", "rms of the held-out samples"]
     return _table(header, rows)
 
 
 def _correlation_table(result: xr.Dataset) -> str:
-    names = [str(name) for name in result["parameter"].values]
-    values = result["correlation"].values
-    rows = [(name, *(f"{value:.2f}" for value in row)) for name, row in zip(names, values, strict=True)]
-    return _table(["", *map(short_name, names)], rows)
+    rows = [(str(name), *(f"{value:.2f}" for value in row)) for name, row in _rows(result, "parameter", "correlation")]
+    return _table(["", *(short_name(name) for name, *_ in rows)], rows)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -34,14 +35,12 @@ def summarize(result: xr.Dataset) -> str:
         result: Dataset of `simulate`, or the partial one that its exception carries.
     """
     require_samples(result)
-    heading = [*_heading(result), *_custom(result), *_warnings(result)]
     is_tracking_run = read_scene(result.attrs).finger.links and is_tracking(result)
     motion = [_tracking(result)] if is_tracking_run else [*_joints(result), *_actuators(result)]
-    tendon_names = [_tension(result)] if result.sizes["tendon"] else []
     blocks = [
-        heading,
+        _heading(result),
         *motion,
-        *tendon_names,
+        *([_tension(result)] if result.sizes["tendon"] else []),
         *_motors(result),
         *_contacts(result),
         _energy(result),
@@ -56,17 +55,10 @@ def _heading(result: xr.Dataset) -> list[str]:
     title = " ".join(str(attributes["title"]).split())
     tolerances = f"rtol {attributes['rtol']:g}, atol_scale {attributes['atol_scale']:g}"
     run = f"{attributes['end_time']:.6g} s simulated with {attributes['method']}, {tolerances}"
-    return [title, run]
-
-
-def _custom(result: xr.Dataset) -> list[str]:
     custom = recorded_custom_parts(result)
-    return [f"Not what the scenario alone gives: {custom} of one's own"] if custom else []
-
-
-def _warnings(result: xr.Dataset) -> list[str]:
-    warnings = [result.attrs[name] for name in _WARNINGS if name in result.attrs]
-    return [line for each in warnings for line in textwrap.wrap(f"Warning: {each}", 80)]
+    parts = [f"Not what the scenario alone gives: {custom} of one's own"] if custom else []
+    warnings = [textwrap.wrap(f"Warning: {attributes[name]}", 80) for name in _WARNINGS if name in attributes]
+    return [title, run, *parts, *(line for lines in warnings for line in lines)]
 
 
 def _tracking(result: xr.Dataset) -> list[str]:
@@ -84,18 +76,16 @@ def _tracking(result: xr.Dataset) -> list[str]:
 def _contacts(result: xr.Dataset) -> list[list[str]]:
     if "contact_force" not in result:
         return []
-    largest_forces = result["contact_normal_force"].max("time")
-    closed = [str(name) for name in result["contact"].values if float(largest_forces.sel(contact=name)) > 0.0]
-    if not closed:
-        return [["Contacts: nothing touched"]]
     rows = []
-    for name in closed:
-        contact = result.sel(contact=name)
+    for name, contact in ((str(name), result.sel(contact=name)) for name in result["contact"].values):
         is_closed = np.asarray(contact["contact_normal_force"]) > 0.0
-        is_sliding = is_closed & (np.asarray(contact["contact_slip"]) > _LEAST_SLIDING_SPEED)
-        shares = (f"{100.0 * np.mean(mask):.1f} %" for mask in (is_closed, is_sliding))
-        greatest = (float(contact[f"contact_{force}"].max()) for force in ("normal_force", "friction"))
-        rows.append((name, *(f"{mask:.3f}" for mask in greatest), *shares))
+        if is_closed.any():
+            is_sliding = is_closed & (np.asarray(contact["contact_slip"]) > _LEAST_SLIDING_SPEED)
+            shares = (f"{100.0 * np.mean(mask):.1f} %" for mask in (is_closed, is_sliding))
+            greatest = [float(contact[f"contact_{force}"].max()) for force in ("normal_force", "friction")]
+            rows.append((*number_row(name, greatest), *shares))
+    if not rows:
+        return [["Contacts: nothing touched"]]
     return [["Contacts, N, and parts of the time", *table(("", "normal", "friction", "touching", "sliding"), rows)]]
 
 
@@ -166,16 +156,8 @@ def _motors(result: xr.Dataset) -> list[list[str]]:
         return []
     current = np.asarray(result["motor_current"].transpose("time", "motor"))
     power = current * np.asarray(result["motor_voltage"].transpose("time", "motor"))
-    rows = [
-        (
-            str(name),
-            f"{np.max(np.abs(motor_current)):.3f}",
-            f"{np.sqrt(np.mean(motor_current**2)):.3f}",
-            f"{np.max(tendon_power):.3f}",
-            f"{np.mean(tendon_power):.3f}",
-        )
-        for name, motor_current, tendon_power in zip(result["motor"].values, current.T, power.T, strict=True)
-    ]
+    columns = (abs(current).max(axis=0), np.sqrt(np.mean(current**2, axis=0)), power.max(axis=0), power.mean(axis=0))
+    rows = [number_row(str(name), row) for name, *row in zip(result["motor"].values, *columns, strict=True)]
     slack = slack_time(result)
     slack_tendons = ", ".join(f"{name} {time:.3g} s" for name, time in slack.items() if time > 0.0) or "none"
     heading = ("", "peak A", "rms A", "peak W", "mean W")
@@ -241,10 +223,14 @@ def _range_table(head: str, signals: Mapping[str, Array], digits: int = 3) -> li
     return [head, *table(("", "least", "greatest"), [_range_row(*each, digits) for each in signals.items()])]
 
 
-def _range_row(name: str, values: Array, digits: int = 3) -> tuple[str, str, str]:
+def _range_row(name: str, values: Array, digits: int = 3) -> tuple[str, ...]:
+    return number_row(name, (values.min(), values.max()), digits)
+
+
+def number_row(name: str, values: Iterable[Any], digits: int = 3) -> tuple[str, ...]:
+    """Return a row of a table: a name, and numbers with so many digits."""
     # Adding zero turns what rounds to -0.0 into 0.0.
-    least, greatest = (round(float(each), digits) + 0.0 for each in (values.min(), values.max()))
-    return name, f"{least:.{digits}f}", f"{greatest:.{digits}f}"
+    return name, *(f"{round(float(each), digits) + 0.0:.{digits}f}" for each in values)
 
 
 def _share(value: float, total: float) -> str:

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.tendons import Tendons
-from finger_pin.views.plots.axes_3d import flexion_plane
 from finger_pin.views.plots.panels import grid, title
+from finger_pin.views.plots.statics import flexion_plane
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, Width, colour, cycle_colours, styled, thin
 from paper.posture import Transmission
 from paper.transmission import flexion_postures, transmission_efficiency

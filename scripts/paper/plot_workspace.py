@@ -13,8 +13,8 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 
 from finger_pin.mechanism.coerce import FingerLike, as_finger, one_finger
 from finger_pin.typing import Array
-from finger_pin.views.plots.axes_3d import AXES, axes_around
 from finger_pin.views.plots.panels import sheet, title
+from finger_pin.views.plots.statics import AXES, axes_around
 from finger_pin.views.plots.style import BLACK, BLUE, ORANGE, VERMILLION, Width, colour, styled, thin
 from paper.workspace_surfaces import fingertip_surface, flexion_section
 

@@ -11,7 +11,7 @@ import pinocchio as pin
 from finger_pin.description.coupling import PassiveCoupling
 from finger_pin.mechanism.finger import Finger
 from finger_pin.typing import Array
-from finger_pin.views.plots.axes_3d import flexion_plane
+from finger_pin.views.plots.statics import flexion_plane
 
 _PARALLEL = 1e-6
 

@@ -7,8 +7,13 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.analysis import critical_friction, force_polytope, self_locking_map, tension_for_force
-from finger_pin.views.plots.critical_friction import plot_critical_friction, plot_runaway, plot_self_locking_map
-from finger_pin.views.plots.fingertip_forces import plot_force_polytope, plot_radius_sensitivity
+from finger_pin.views.plots.statics import (
+    plot_critical_friction,
+    plot_force_polytope,
+    plot_radius_sensitivity,
+    plot_runaway,
+    plot_self_locking_map,
+)
 
 pytestmark = pytest.mark.usefixtures("coarse_sections")
 

@@ -98,7 +98,7 @@ def shown(tmp_path_factory):
         patch.setattr("finger_pin.views.viewer.page_server.PageHandle.wait", lambda viewing: viewing.close())
         patch.setattr("finger_pin.views.playground.player.Playground.wait", lambda playing: playing.close())
         patch.setattr("finger_pin.views.plots.figure_files.save_figure", not_painted)
-        patch.setattr("finger_pin.views.plots.fingertip_forces._DIRECTIONS", 12)
+        patch.setattr("finger_pin.views.plots.statics._DIRECTIONS", 12)
         # The comparison of controllers leaves out the start.
         patch.setattr("paper.comparison.SETTLED", 0.0)
         meshcat = importlib.import_module("meshcat")

@@ -10,7 +10,7 @@ import finger_pin as fp
 from finger_pin.exceptions import InputError
 from finger_pin.views import plots
 from finger_pin.views.plots.figure_files import figures_by_name
-from finger_pin.views.plots.hand_motion import plot_hand_motion
+from finger_pin.views.plots.hands import plot_hand_motion
 from finger_pin.views.plots.lines import BINS, extremes
 from finger_pin.views.plots.panels import labelled
 

@@ -13,7 +13,7 @@ from viser import uplot
 from finger_pin.typing import Array
 from finger_pin.views.playground.session import Reading, Session
 from finger_pin.views.playground.stage import Stage
-from finger_pin.views.viewer.colours import tension_colours
+from finger_pin.views.viewer.solids import tension_colours
 
 # Of the plots: their length, s, and the time between samples, s.
 _PLOT_DURATION, _SAMPLE_PERIOD = 10.0, 0.05

@@ -1,24 +1,30 @@
-"""Playground: the loop that steps a scenario in real time, and the page that shows it."""
+"""Playground: the loop that steps a scenario in real time, and the page that shows it, which alone may connect."""
 
 from __future__ import annotations
 
 import queue
+import socket
 import threading
 import time
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from functools import partial
+from http import HTTPStatus
+from ipaddress import ip_address
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
+from urllib.parse import urlsplit
 
 import viser
+from websockets.asyncio import server as websockets
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
 
 from finger_pin.exceptions import FingerPinError
 from finger_pin.simulation.simulator import Simulator
 from finger_pin.threads import wait_for
-from finger_pin.views.playground.access import own_page_only
-from finger_pin.views.playground.pacer import Pacer
 from finger_pin.views.playground.panel import PAUSE, PLAY, RESET, STEP, Panel
-from finger_pin.views.playground.session import Session, save_pieces
+from finger_pin.views.playground.session import Pacer, Session, save_pieces
 from finger_pin.views.playground.stage import Stage
 from finger_pin.views.viewer.page_server import open_page
 
@@ -192,3 +198,73 @@ def serve(
         print(f"Play at {playground.url} (Ctrl-C ends this)", flush=True)
         playground.wait()
     return playground
+
+
+Handler = Callable[[websockets.ServerConnection, Request], Response | None]
+
+
+@contextmanager
+def own_page_only(host: str) -> Iterator[None]:
+    """Make servers that viser starts in this context refuse requests of other pages.
+
+    Viser passes its handler of requests to `websockets` and accepts no custom one: it is wrapped there.
+
+    Args:
+        host: Interface on which the page is served.
+
+    Raises:
+        FingerPinError: If no handler was wrapped, as viser starts its server in another way.
+    """
+    serve, wrapped_hosts = websockets.serve, []
+
+    def guarded_serve(*arguments: Any, process_request: Handler, **options: Any) -> Any:
+        wrapped_hosts.append(host)
+        return serve(*arguments, process_request=partial(_handle, host, process_request), **options)
+
+    websockets.serve = guarded_serve  # type: ignore[assignment,misc]
+    try:
+        yield
+    finally:
+        websockets.serve = serve  # type: ignore[misc]
+    if not wrapped_hosts:
+        raise FingerPinError("this version of viser cannot be kept from other pages: install viser 1.1")
+
+
+def _handle(host: str, handler: Handler, connection: websockets.ServerConnection, request: Request) -> Response | None:
+    reason = refusal(request.headers, host)
+    if reason:
+        return connection.respond(HTTPStatus.FORBIDDEN, f"{reason}\n")
+    return handler(connection, request)
+
+
+def refusal(headers: Headers, host: str) -> str:
+    """Return the reason for refusing a request, or nothing if it comes from the page itself.
+
+    A name that a foreign DNS server points to this machine is refused, addresses are accepted. Browsers send the
+    origin of the page that opens a WebSocket, and no page can change it.
+
+    Args:
+        headers: Headers of the request.
+        host: Interface on which the page is served.
+    """
+    hosts = headers.get_all("Host")
+    name = urlsplit(f"//{hosts[0]}").hostname if len(hosts) == 1 else None
+    if name is None or not (_is_address(name) or name in _host_names(host)):
+        return f"Host {', '.join(hosts)}: open the page by an address or a name of this machine, such as localhost"
+    origins = headers.get_all("Origin")
+    if headers.get("Upgrade") is None and not origins:
+        return ""
+    if [urlsplit(origin).netloc.lower() for origin in origins] != [hosts[0].lower()]:
+        return f"Origin {', '.join(origins) or 'missing'}: only the page of {hosts[0]} itself may play"
+    return ""
+
+
+def _host_names(host: str) -> set[str]:
+    hostname = socket.gethostname().lower()
+    return {"localhost", host.lower(), hostname, f"{hostname}.local", socket.getfqdn().lower()}
+
+
+def _is_address(name: str) -> bool:
+    with suppress(ValueError):
+        return bool(ip_address(name))
+    return False

@@ -1,8 +1,9 @@
-"""A played scenario without its page: simulator, inputs, springs at the tips, record."""
+"""A played scenario without its page: simulator, inputs, springs at the tips, record, pace."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,8 +19,7 @@ from finger_pin.mechanism.signals import FingerSignals
 from finger_pin.simulation.netcdf import save
 from finger_pin.simulation.simulator import Simulator
 from finger_pin.typing import Array
-from finger_pin.views.playground.input_sliders import Inputs, Slider
-from finger_pin.views.playground.parameter_sliders import FINGER, parameters
+from finger_pin.views.playground.sliders import FINGER, Inputs, Slider, parameters
 
 # Of what is not recorded this much is kept, s.
 _LOG_DURATION = 60.0
@@ -233,3 +233,58 @@ def save_pieces(pieces: Sequence[Simulator], folder: Path, name: str) -> list[Pa
     for result, path in zip(results, paths, strict=True):
         save(result, path)
     return paths
+
+
+#: Frames per second that are aimed at.
+FRAME_RATE = 60.0
+# Most wall time of a frame's steps, and of what is still owed from before, s.
+_MAX_STEP_TIME, _MAX_BACKLOG = 1.0 / 30.0, 0.1
+# Time over which the rate is averaged, s; below this part of the wish, time is called slow.
+_AVERAGING_TIME, _SLOW_RATE = 0.7, 0.9
+
+
+class Pacer:
+    """Clock that keeps simulated time in pace with wall time, as far as the machine can.
+
+    Attributes:
+        speed: Desired simulated seconds per second.
+        rate: Actual simulated seconds per second.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
+        """Start now, by a clock in s."""
+        self._clock, self.speed = clock, 1.0
+        self.restart()
+
+    def restart(self) -> None:
+        """Restart the clock, such as after a pause."""
+        self.rate, self._backlog, self._frame_start = self.speed, 0.0, self._clock()
+
+    def start_frame(self) -> float:
+        """Start a frame; return the simulated time that is due, s."""
+        now = self._clock()
+        self._frame_time, self._frame_start = now - self._frame_start, now
+        # A larger backlog is dropped: time runs slower.
+        self._backlog = min(self._backlog + self.speed * self._frame_time, self.speed * _MAX_BACKLOG)
+        return self._backlog
+
+    @property
+    def is_late(self) -> bool:
+        """True once the steps of this frame have taken as long as they may."""
+        return self._clock() - self._frame_start > _MAX_STEP_TIME
+
+    def finish_frame(self, simulated: float) -> None:
+        """End a frame, with the simulated time in it, s."""
+        self._backlog -= simulated
+        if self._frame_time > 0.0:
+            share = min(self._frame_time / _AVERAGING_TIME, 1.0)
+            self.rate += share * (simulated / self._frame_time - self.rate)
+
+    @property
+    def is_slow(self) -> bool:
+        """True where the machine cannot follow."""
+        return self.rate < _SLOW_RATE * self.speed
+
+    def idle_time(self) -> float:
+        """Return the time to wait for the next frame, s."""
+        return max(0.0, self._frame_start + 1.0 / FRAME_RATE - self._clock())

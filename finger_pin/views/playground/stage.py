@@ -14,17 +14,27 @@ from finger_pin.description.primitives import Geometry
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.typing import Array
 from finger_pin.views.playground.session import Reading, Session
-from finger_pin.views.viewer.colours import FORCE_COLOUR, strand_colours, tension_scale
 from finger_pin.views.viewer.scene import Scene
 from finger_pin.views.viewer.scene_objects import SceneObjects
-from finger_pin.views.viewer.solids import ROOT, Solid, link_names, link_solids, newton_length
+from finger_pin.views.viewer.solids import (
+    ARROW_LENGTH,
+    CAMERA_DIRECTION,
+    FORCE_COLOUR,
+    ROOT,
+    Solid,
+    link_names,
+    link_solids,
+    newton_length,
+    strand_colours,
+    tension_scale,
+)
 
-# Shares of the finger's length: the longest arrow of a force, the cross to drag the tip.
-_ARROW_LENGTH, _CROSS_SIZE = 0.22, 0.16
+# Of the cross to drag the tip, in parts of the finger's length.
+_CROSS_SIZE = 0.16
 # Largest force that an arrow shows in full length, N; tension that the colours reach at first, N.
 _LARGE_FORCE, _SCALE = 5.0, 4.0
 # The camera, from the middle of what it sees, and how far away, in parts of its extent.
-_CAMERA, _CAMERA_DISTANCE, _CAMERA_SHIFT = np.array([0.42, -1.0, 0.5]), 1.5, 0.16
+_CAMERA_DISTANCE, _CAMERA_SHIFT = 1.5, 0.16
 # Instants of the scenario's own motion that are in view.
 _VIEW_SAMPLES = 25
 # Largest opacity to which links are raised from that of the viewer's page, whose ground is brighter.
@@ -71,7 +81,7 @@ class Stage:
             self._viser.add_line_segments(f"{ROOT}/{name}", _NO_LINES, (200, 200, 200), thickness=line_width)
             for name, line_width in (("taut", width), ("slack", 0.45 * width))
         )
-        self._force_scale = newton_length(_ARROW_LENGTH * self.scene.size, _LARGE_FORCE)
+        self._force_scale = newton_length(ARROW_LENGTH * self.scene.size, _LARGE_FORCE)
         arrow_radius = 0.6 * self.scene.tube_radius
         self._contacts = self._viser.add_arrows(
             f"{ROOT}/contacts",
@@ -142,7 +152,8 @@ class Stage:
         points = np.array(header["inView"])
         low, high = points.min(axis=0), points.max(axis=0)
         middle, extent = 0.5 * (low + high), float(np.linalg.norm(high - low))
-        direction, right = (_CAMERA / np.linalg.norm(_CAMERA), np.cross([0.0, 0.0, 1.0], _CAMERA))
+        direction = CAMERA_DIRECTION / np.linalg.norm(CAMERA_DIRECTION)
+        right = np.cross([0.0, 0.0, 1.0], CAMERA_DIRECTION)
         camera = server.initial_camera
         camera.near, camera.far, camera.fov = 0.02 * extent, 50.0 * extent, 0.8
         # The controls stand at the right.

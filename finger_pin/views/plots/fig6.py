@@ -1,4 +1,4 @@
-"""Fig. 6: angles over references, tracking errors, and every tendon's tension as planned and as delivered."""
+"""Fig. 6: angles, tracking errors, and tensions as planned and as delivered, of one result or of two."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from finger_pin.exceptions import InputError
 from finger_pin.simulation.recording import is_tracking
 from finger_pin.typing import Array
 from finger_pin.views.plots.hands import finger_of, fingers_of, plot_by_finger
@@ -80,19 +81,20 @@ def plot_fig6(result: xr.Dataset, finger: str | None = None, *, width: Width = N
 
 
 def _draw_joints(axes: Axes, result: xr.Dataset, variable: str) -> None:
-    time, values = times(result), _in_joint_units(result, variable)
+    time, values = times(result), _in_shown_units(result, variable)
     bundle(axes, time, values, names(result, "joint"), range(values.shape[1]))
 
 
-def _in_joint_units(result: xr.Dataset, variable: str) -> Array:
-    """Return a variable of the joints, shape (m, n), in the units that are shown."""
-    factors = np.array([factor for factor, _ in shown_joints(result).values()])
-    return np.asarray(factors * result[variable].transpose("time", "joint").values)
+def _in_shown_units(result: xr.Dataset, variable: str) -> Array:
+    """Return a variable of the joints or the tendons, shape (m, n), in the units that are shown."""
+    signals = result[variable].transpose("time", ...)
+    factors = np.array([factor for factor, _ in shown_joints(result).values()]) if "joint" in signals.dims else 1.0
+    return np.asarray(factors * signals.values)
 
 
 def _draw_references(axes: Axes, result: xr.Dataset) -> Line2D:
     """Draw theta^d of all joints, and return a line that stands for them."""
-    time, values = times(result), _in_joint_units(result, "joint_reference")
+    time, values = times(result), _in_shown_units(result, "joint_reference")
     options: dict[str, Any] = {"color": BLACK, "linestyle": "--", "linewidth": thin(0.7)}
     return [trace(axes, time, column, label="reference θᵈ", **options) for column in values.T][-1]
 
@@ -112,3 +114,63 @@ def _draw_tensions(panels: list[Axes], result: xr.Dataset) -> None:
         if name in proximal:
             trace(axes, time, proximal[name], **markers)
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+
+
+@styled
+def compare(
+    first: xr.Dataset,
+    second: xr.Dataset,
+    labels: tuple[str, str] = ("first", "second"),
+    *,
+    width: Width = None,
+    titles: bool = True,
+) -> Figure:
+    """Draw two results of fingers with the same joints and tendons over each other.
+
+    (a) theta by joint, deg, with the references. (b) theta^d - theta by joint, deg, or where no joints had a reference
+    theta', deg/s. (c) The delivered tension f by tendon, N.
+
+    Args:
+        first: Dataset of `simulate`.
+        second: Another; it may be longer or sampled otherwise.
+        labels: Names of the two in the legend.
+        width: Of the figure: in, `column` or `page` (`style.Width`).
+        titles: Whether panels have titles.
+    """
+    for coordinate in ("joint", "tendon"):
+        if names(first, coordinate) != names(second, coordinate):
+            allowed = f"must have the {coordinate}s of the first, {', '.join(names(first, coordinate))}"
+            raise InputError("second", allowed, names(second, coordinate))
+    joints, tendons = names(first, "joint"), names(first, "tendon")
+    height = max(6.6, 1.3 * max(len(joints), len(tendons)))
+    figure, panel_groups = sheet([(4.8, height)] * 3, width, titles)
+    start_time = min(times(result)[0] for result in (first, second))
+    end_time = max(times(result)[-1] for result in (first, second))
+    tracking, angles = is_tracking(first) or is_tracking(second), [unit for _, unit in shown_joints(first).values()]
+    rates = [f"{unit}/s" for unit in angles]
+    columns = (
+        (joints, angles, f"(a) joint angles{', reference dashed' if tracking else ''}", "joint_position"),
+        (joints, angles, "(b) tracking errors", "tracking_error")
+        if tracking
+        else (joints, rates, "(b) joint velocities, without a reference", "joint_velocity"),
+        (tendons, ["N"] * len(tendons), "(c) delivered tensions", "tendon_tension"),
+    )
+    for part, (rows, units, text, variable) in zip(panel_groups, columns, strict=True):
+        if not rows:
+            empty_panel(part, NO_TENDONS)
+            continue
+        panels = stack(part, list(map(labelled, rows, units)))
+        title(panels[0], text)
+        for result, label, colour in zip((first, second), labels, (BLUE, VERMILLION), strict=True):
+            time = times(result)
+            curves = {variable: {"label": label, "color": colour, "linewidth": thin()}}
+            if variable == "tracking_error" and not is_tracking(result):
+                continue
+            if variable == "joint_position" and is_tracking(result):
+                curves["joint_reference"] = {"color": BLACK, "linestyle": "--", "linewidth": thin(0.6), "zorder": 1.5}
+            for name, options in curves.items():
+                for axes, column in zip(panels, _in_shown_units(result, name).T, strict=True):
+                    trace(axes, time, column, **options)
+        panels[0].set_xlim(start_time, end_time)
+        legend(part, [line for line in panels[0].get_lines() if line.get_label() in labels])
+    return figure

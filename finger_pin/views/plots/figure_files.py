@@ -12,13 +12,11 @@ from matplotlib.figure import Figure
 from finger_pin.exceptions import InputError
 from finger_pin.files import replacing
 from finger_pin.simulation.frames import read_scene
-from finger_pin.views.plots.bends import plot_bends
 from finger_pin.views.plots.contact_forces import plot_contact
-from finger_pin.views.plots.convergence_check import plot_convergence
-from finger_pin.views.plots.energy_account import plot_energy
+from finger_pin.views.plots.energy_account import plot_convergence, plot_energy
 from finger_pin.views.plots.fig6 import plot_fig6
-from finger_pin.views.plots.hand_motion import plot_hand_motion
-from finger_pin.views.plots.losses import plot_losses
+from finger_pin.views.plots.hands import plot_hand_motion
+from finger_pin.views.plots.losses import plot_bends, plot_losses
 from finger_pin.views.plots.servo import plot_servo
 from finger_pin.views.plots.style import Width, settings
 
@@ -26,20 +24,19 @@ FORMATS = ("png", "pdf", "svg")
 #: What is drawn of every result of a finger, and of a hand.
 FIGURES = {"fig6": plot_fig6, "losses": plot_losses, "energy": plot_energy}
 TREE_FIGURES = {"motion": plot_hand_motion, "energy": plot_energy}
+#: What is drawn of results with a variable: by name the function, and the variable.
+_FIGURES_OF_VARIABLES: dict[str, tuple[Callable[..., Figure], str]] = {
+    "convergence": (plot_convergence, "convergence_difference"),
+    "contact": (plot_contact, "contact_force"),
+    "servo": (plot_servo, "motor_current"),
+    "bends": (plot_bends, "wrap_tension"),
+}
 
 
 def figures_by_name(result: xr.Dataset) -> dict[str, Callable[..., Figure]]:
     """Return the figures that are drawn of a result, by name."""
     figures: dict[str, Callable[..., Figure]] = dict(FIGURES if read_scene(result.attrs).finger.links else TREE_FIGURES)
-    if "convergence_difference" in result:
-        figures["convergence"] = plot_convergence
-    if "contact_force" in result:
-        figures["contact"] = plot_contact
-    if "motor_current" in result:
-        figures["servo"] = plot_servo
-    if "wrap_tension" in result:
-        figures["bends"] = plot_bends
-    return figures
+    return figures | {name: draw for name, (draw, key) in _FIGURES_OF_VARIABLES.items() if key in result}
 
 
 def draw_all(

@@ -14,7 +14,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from finger_pin.exceptions import InputError
-from finger_pin.views.plots.panels import grid, legend, title
+from finger_pin.views.plots.panels import empty_axes, grid, legend, title
 from finger_pin.views.plots.style import BLACK, BLUE, GREY, VERMILLION, Width, colour, styled, thin
 from finger_pin.views.shown_units import in_shown_units
 
@@ -22,6 +22,7 @@ from finger_pin.views.shown_units import in_shown_units
 _PERCENTILES, _MARGIN = (0.0, 95.0), 0.08
 # Designs of a front that are nearer to one with a number than this have none, in parts of the panel.
 _LABEL_DISTANCE = (0.035, 0.04)
+_NONE_FEASIBLE = "no design keeps all bounds"
 
 
 @styled
@@ -90,7 +91,7 @@ def _draw_magnified(overview: Axes, detail: Axes, result: xr.Dataset, first: str
     detail.set_xlabel(overview.get_xlabel())
     if not order.size:
         detail.set_axis_off()
-        detail.text(0.5, 0.5, "no design keeps all bounds", transform=detail.transAxes, ha="center", color=colour(GREY))
+        empty_axes(detail, _NONE_FEASIBLE)
         return
     labelled_points = result["feasible"].values & (front == 0)
     detail.plot(x[labelled_points], y[labelled_points], "o", **_feasible_style())
@@ -124,7 +125,7 @@ def _draw_course(result: xr.Dataset, name: str, width: Width, titles: bool) -> F
     if rows.size:
         axes.step(rows, best.accumulate(values), where="post", color=colour(VERMILLION), label="best so far")
     else:
-        axes.text(0.5, 0.5, "no design keeps all bounds", transform=axes.transAxes, ha="center", color=colour(GREY))
+        empty_axes(axes, _NONE_FEASIBLE)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("design, in the order of the search")
     axes.set_ylabel(_label(result, name))

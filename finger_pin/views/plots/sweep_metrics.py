@@ -134,7 +134,7 @@ def _draw_scatter(result: xr.Dataset, keys: list[str], width: Width, titles: boo
     panels = figure.subplots(len(metrics), len(keys), squeeze=False, sharex="col", sharey="row")
     failed = result["status"].values.ravel() != "done"
     for name, row in zip(metrics, panels, strict=True):
-        row[0].set_ylabel(labelled(_with_spaces(name), result[name].attrs["units"]))
+        row[0].set_ylabel(labelled(name.replace("_", " "), result[name].attrs["units"]))
         for key, axes in zip(keys, row, strict=True):
             axes.plot(_point_values(result, key), _point_values(result, name), "o", **_RUN_STYLE, color=colour(BLUE))
             axes.xaxis.set_major_locator(MaxNLocator(max(1, int(1.6 * column_count / len(keys) - 0.8))))
@@ -210,10 +210,6 @@ def _label(result: xr.Dataset, key: str) -> str:
 def _unit(result: xr.Dataset, name: str) -> str:
     unit = str(result[name].attrs["units"])
     return "" if unit == "1" else unit
-
-
-def _with_spaces(name: str) -> str:
-    return name.replace("_", " ")
 
 
 def _logarithmic(values: Array) -> bool:

@@ -13,9 +13,18 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.typing import Array
 from finger_pin.views.viewer.animation import Playback
-from finger_pin.views.viewer.colours import FORCE_COLOUR, strand_colours, tension_scale
 from finger_pin.views.viewer.scene import Scene
-from finger_pin.views.viewer.solids import ROOT, Command, link_names, link_solids, pose_matrix, set_object
+from finger_pin.views.viewer.solids import (
+    FORCE_COLOUR,
+    ROOT,
+    Command,
+    link_names,
+    link_solids,
+    pose_command,
+    set_object,
+    strand_colours,
+    tension_scale,
+)
 
 if TYPE_CHECKING:
     import meshcat
@@ -69,16 +78,11 @@ def draw(visualizer: meshcat.Visualizer, result: xr.Dataset, *, speed: float = 1
 def _frame(scene: Scene, position: Array, tension: Array, scale: float, palm: LinkPoses | None) -> list[Command]:
     geometry = scene.geometry
     poses = geometry.poses(position, palm)
-    commands = [_placement(name, poses, index) for index, name in enumerate(link_names(geometry))]
+    commands = [*map(pose_command, link_names(geometry), poses.rotation, poses.translation)]
     colours = strand_colours(tension, scale)
     for path, tendon in zip(geometry.paths(position, scene.looseness(tension), poses), scene.tendons, strict=True):
         commands.append(_tube(path.name, path.points, scene.tube_radius, colours[tendon["strand"]]))
     return commands
-
-
-def _placement(name: str, poses: LinkPoses, index: int) -> Command:
-    matrix = pose_matrix(poses.rotation[index], poses.translation[index])
-    return {"type": "set_transform", "path": f"{ROOT}/{name}", "matrix": matrix}
 
 
 def _tube(name: str, points: Array, radius: float, colours: Array) -> Command:

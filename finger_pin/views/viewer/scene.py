@@ -18,9 +18,18 @@ from finger_pin.mechanism.coerce import FingerLike, description_of
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.geometry import LinkPoses, TendonGeometry, Visual, joint_axes
 from finger_pin.typing import Array
-from finger_pin.views.viewer.colours import PAGE_COLOURS, SLACK_TENSION, looseness, tension_scale
-from finger_pin.views.viewer.force_set import ForceSet
-from finger_pin.views.viewer.solids import ROOT, Command, link_names, link_solids, root_command
+from finger_pin.views.viewer.scene_objects import ForceSet
+from finger_pin.views.viewer.solids import (
+    PAGE_COLOURS,
+    ROOT,
+    SLACK_TENSION,
+    Command,
+    link_names,
+    link_solids,
+    looseness,
+    pose_command,
+    tension_scale,
+)
 
 #: Radius of the tube that is drawn for a tendon: most, in parts of the distance between neighbouring tendons and of
 #: the width of the narrowest link.
@@ -138,7 +147,10 @@ class Scene:
         force_set = ForceSet.from_polytope(forces, self.size) if forces is not None else None
         extra = ([] if force_set is None else [force_set.corners]) + ([] if ghost is None else [ghost.points_in_view()])
         corners = self._in_view(joint_positions, palm, extra)
-        commands = [root_command(rotation), *(solid.command() for solid in link_solids(geometry, tube))]
+        commands = [
+            pose_command("", rotation, np.zeros(3)),
+            *(solid.command() for solid in link_solids(geometry, tube)),
+        ]
         for drawn in (force_set, ghost):
             commands += () if drawn is None else drawn.commands()
         return {

@@ -1,4 +1,4 @@
-"""Objects around a finger, for the page, and of every closed contact its force and its friction cone."""
+"""Objects around a finger, forces and friction cones of closed contacts, and forces that a fingertip can exert."""
 
 from __future__ import annotations
 
@@ -12,18 +12,27 @@ import pinocchio as pin
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
+from finger_pin.analysis import ForcePolytope
 from finger_pin.description.objects import Object
 from finger_pin.description.primitives import KINDS, Geometry
 from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.simulation.frames import read_scene
 from finger_pin.typing import Array
-from finger_pin.views.viewer.solids import ROOT, SOLID_OPACITY, Command, Solid, newton_length, pose_matrix
+from finger_pin.views.viewer.solids import (
+    ARROW_LENGTH,
+    ROOT,
+    SOLID_OPACITY,
+    Command,
+    Solid,
+    buffer_geometry,
+    newton_length,
+    pose_command,
+    set_object,
+)
 
 _FIXED_COLOUR, _FREE_COLOUR = (0.45, 0.52, 0.62), (0.95, 0.72, 0.25)
 #: Thickness of the plate that is drawn for a half-space, and how far it reaches, in parts of the finger's length.
 _PLATE_THICKNESS, _PLATE_RADIUS = 0.015, 0.35
-#: Length of the longest arrow, in parts of the finger's length.
-_ARROW_LENGTH = 0.22
 #: Slant of the largest friction cone, in parts of the finger's length: about the width of a finger.
 _CONE_SLANT = 0.05
 
@@ -143,13 +152,12 @@ class SceneObjects:
 
     def _force_scale(self) -> float:
         return newton_length(
-            _ARROW_LENGTH * self.size, float(np.max(np.linalg.norm(self.contacts[..., 3:6], axis=-1), initial=0.0))
+            ARROW_LENGTH * self.size, float(np.max(np.linalg.norm(self.contacts[..., 3:6], axis=-1), initial=0.0))
         )
 
     @staticmethod
     def _placement(name: str, pose: Array) -> Command:
-        rotation = pin.Quaternion(pose[3:]).toRotationMatrix()
-        return {"type": "set_transform", "path": f"{ROOT}/object_{name}", "matrix": pose_matrix(rotation, pose[:3])}
+        return pose_command(f"object_{name}", pin.Quaternion(pose[3:]).toRotationMatrix(), pose[:3])
 
     def solids(self, name: str) -> Iterator[Solid]:
         """Yield the solids of an object, whose frame is ``object_<name>``."""
@@ -175,3 +183,60 @@ def _box_corners(scene_object: Object) -> Array:
     rotation = pin.Quaternion(scene_object.quaternion).toRotationMatrix()
     corners = np.array(list(product((-1.0, 1.0), repeat=3))) * half_sides
     return np.asarray(corners @ rotation.T + scene_object.position)
+
+
+_PATH = f"{ROOT}/forces"
+_COLOUR, _RIM_COLOUR, _OPACITY = 0xFFB347, 0xFFD9A0, 0.22
+#: Largest extent of the drawn set, in parts of the finger's length.
+_SIZE_SHARE = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class ForceSet:
+    """A force polytope at a scale.
+
+    Attributes:
+        polytope: The forces, N.
+        scale: Length that stands for a newton, m/N: 1, 2 or 5 times a power of ten.
+    """
+
+    polytope: ForcePolytope
+    scale: float
+
+    @classmethod
+    def from_polytope(cls, polytope: ForcePolytope, length: float) -> ForceSet:
+        """Choose a scale at which the set is at most half as large as a finger of some length, m."""
+        extent = float(np.max(np.linalg.norm(polytope.vertices, axis=1)))
+        return cls(polytope, newton_length(_SIZE_SHARE * length, extent) if extent > 0.0 else 1.0)
+
+    @property
+    def corners(self) -> Array:
+        """The vertices, shape (v, 3), m, base frame."""
+        return np.asarray(self.polytope.tip + self.scale * self.polytope.vertices)
+
+    @property
+    def note(self) -> str:
+        """The legend of the drawing, for the panel."""
+        return f"forces at the tip, {1e3 * self.scale:.4g} mm per N"
+
+    def commands(self) -> Iterator[Command]:
+        """Yield meshcat's commands: the body, if there is one, its edges, and its origin, the fingertip."""
+        triangles = self.polytope.triangles()
+        if len(triangles):
+            normals = np.repeat(_normals(self.polytope.vertices[triangles]), 3, axis=0)
+            body = {"position": self.corners[triangles].reshape(-1, 3), "normal": normals}
+            # Both sides, without hiding what is inside.
+            material = {"type": "MeshPhongMaterial", "color": _COLOUR, "opacity": _OPACITY, "side": 2, "shininess": 20}
+            yield _object(f"{_PATH}/body", "Mesh", body, material)
+        edges = self.corners[np.array(self.polytope.ridges(), dtype=int).reshape(-1, 2)]
+        rim = {"type": "LineBasicMaterial", "color": _RIM_COLOUR, "opacity": 0.9}
+        yield _object(f"{_PATH}/edges", "LineSegments", {"position": edges.reshape(-1, 3)}, rim)
+
+
+def _normals(triangles: Array) -> Array:
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300))
+
+
+def _object(path: str, kind: str, attributes: dict[str, Array], material: Command) -> Command:
+    return set_object(path, kind, buffer_geometry(attributes), {"transparent": True, "depthWrite": False, **material})

@@ -1,4 +1,4 @@
-"""Solids of the scene: the visuals of the URDF, a groove for every winding, and meshcat's commands for them."""
+"""Solids and colours, the same on the page, in films, in meshcat's window and in the playground."""
 
 from __future__ import annotations
 
@@ -8,12 +8,68 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger_pin.description.primitives import Geometry
 from finger_pin.mechanism.geometry import TendonGeometry
 from finger_pin.typing import Array
 
+#: Below this tension a tendon is drawn loose, wholly at none, N.
+SLACK_TENSION = 0.05
+# Colours of tensions, red, green and blue, from none to the largest: the upper three quarters of viridis, which is
+# perceptually uniform and safe for colour-blind readers; its darkest quarter would vanish on a dark background.
+_TENSION_COLOURS = (
+    *((0.230, 0.322, 0.546), (0.207, 0.372, 0.553), (0.186, 0.419, 0.557), (0.167, 0.464, 0.558)),
+    *((0.149, 0.508, 0.557), (0.132, 0.552, 0.553), (0.121, 0.596, 0.544), (0.125, 0.640, 0.527)),
+    *((0.158, 0.684, 0.502), (0.220, 0.726, 0.466), (0.304, 0.765, 0.420), (0.404, 0.800, 0.363)),
+    *((0.516, 0.831, 0.294), (0.637, 0.857, 0.217), (0.762, 0.876, 0.137), (0.886, 0.892, 0.095)),
+    (0.993, 0.906, 0.144),
+)
+_SLACK_COLOUR = (0.62, 0.64, 0.67)
+# Of a cord without a known tension, which no tension has.
+_CORD_COLOUR = (0.93, 0.9, 0.82)
+#: The same for the page.
+PAGE_COLOURS = {"tension": _TENSION_COLOURS, "slack": _SLACK_COLOUR, "cord": _CORD_COLOUR}
+#: Of the arrow of a contact's force, at both ends: that of the page, which no tension has.
+FORCE_COLOUR = np.tile(np.array([0xFF, 0x5A, 0x5A]) / 255.0, (2, 1))
+
+
+def looseness(tension: Array) -> Array:
+    """Return how loose a tendon is drawn at a tension, N: 0 if it is taut, 1 at no tension."""
+    return np.clip(1.0 - tension / SLACK_TENSION, 0.0, 1.0)
+
+
+def tension_colours(tension: Array, scale: float) -> Array:
+    """Return the colour of tensions, shape (..., 3): the upper part of viridis up to a scale, N; grey when loose."""
+    place = np.clip(tension / scale, 0.0, 1.0) * (len(_TENSION_COLOURS) - 1)
+    channels = np.array(_TENSION_COLOURS).T
+    taut = np.stack([np.interp(place, np.arange(len(channel)), channel) for channel in channels], axis=-1)
+    return np.asarray(taut + looseness(tension)[..., None] * (np.array(_SLACK_COLOUR) - taut))
+
+
+def strand_colours(tension: Array, scale: float) -> Array:
+    """Return the colours of strands, shape (s + 1, 3), the last of which is that of cords without a known tension.
+
+    Args:
+        tension: Shape (s,), N.
+        scale: As for `tension_colours`.
+    """
+    return np.concatenate([tension_colours(tension, scale), [_CORD_COLOUR]])
+
+
+def tension_scale(tension: float) -> float:
+    """Return the upper end of a legend of tensions, N: its quarters are short numbers."""
+    if not tension > 0.0:
+        return 1.0
+    decade = 10.0 ** math.floor(math.log10(tension))
+    return float(next(step * decade for step in (1, 2, 4, 6, 8, 10) if step * decade >= tension * (1.0 - 1e-9)))
+
+
 ROOT = "/finger_pin"
+#: From the finger to the camera, in the scene, where z is up; the page's oblique view.
+CAMERA_DIRECTION = np.array([0.42, -1.0, 0.5])
+#: Length of the longest arrow of a force, in parts of the finger's length.
+ARROW_LENGTH = 0.22
 Command = dict[str, Any]
 
 #: Opacity of solids and grooves, so that the tendons show inside.
@@ -57,7 +113,9 @@ class Solid:
             root: Path below which the frame stands.
             colour: In place of the solid's own, if given.
         """
-        shape, turn = _GEOMETRIES.get(self.geometry.kind) or (_mesh(self.geometry), np.eye(3))
+        shape, turn = _GEOMETRIES.get(self.geometry.kind, ({}, np.eye(3)))
+        if not shape:
+            shape = buffer_geometry({"position": np.round(self.geometry.corners, 5)}, self.geometry.faces)
         red, green, blue = (round(255 * float(component)) for component in colour or self.colour)
         material = {
             "type": "MeshPhongMaterial",
@@ -74,11 +132,14 @@ class Solid:
         return set_object(path, "Mesh", shape, material, matrix)
 
 
-def _mesh(shape: Geometry) -> Command:
-    corners = np.round(shape.corners, 5).ravel().tolist()
-    attributes = {"position": {"itemSize": 3, "type": "Float32Array", "array": corners}}
-    index = {"type": "Uint32Array", "array": shape.faces.ravel().tolist()}
-    return {"type": "BufferGeometry", "data": {"attributes": attributes, "index": index}}
+def buffer_geometry(attributes: dict[str, Array], faces: NDArray[Any] | None = None) -> Command:
+    """Return three.js's geometry of vertices, shape (..., 3), such as ``position``, and of triangles of them."""
+    buffers = {
+        name: {"itemSize": 3, "type": "Float32Array", "array": values.ravel().tolist()}
+        for name, values in attributes.items()
+    }
+    index = {} if faces is None else {"index": {"type": "Uint32Array", "array": faces.ravel().tolist()}}
+    return {"type": "BufferGeometry", "data": {"attributes": buffers, **index}}
 
 
 def link_names(geometry: TendonGeometry) -> list[str]:
@@ -106,9 +167,10 @@ def link_solids(geometry: TendonGeometry, tube_radius: float) -> Iterator[Solid]
         yield Solid(links[arc.joint], name, shape, *pose, _GROOVE_COLOUR, SOLID_OPACITY)
 
 
-def root_command(rotation: Array) -> Command:
-    """Return meshcat's ``set_transform`` command that turns the base frame into the frame of the scene."""
-    return {"type": "set_transform", "path": ROOT, "matrix": pose_matrix(rotation, np.zeros(3))}
+def pose_command(name: str, rotation: Array, translation: Array) -> Command:
+    """Return meshcat's ``set_transform`` command for the pose of a frame below the scene's root, or of the root."""
+    path = f"{ROOT}/{name}" if name else ROOT
+    return {"type": "set_transform", "path": path, "matrix": pose_matrix(rotation, translation)}
 
 
 def set_object(path: str, kind: str, shape: Command, material: Command, matrix: list[float] | None = None) -> Command:

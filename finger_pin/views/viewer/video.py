@@ -27,12 +27,18 @@ from finger_pin.mechanism.geometry import LinkPoses
 from finger_pin.typing import Array
 from finger_pin.views.plots.style import new_figure, styled
 from finger_pin.views.viewer.animation import Playback
-from finger_pin.views.viewer.colours import FORCE_COLOUR, strand_colours, tension_colours, tension_scale
-from finger_pin.views.viewer.solids import Solid, link_names, link_solids
+from finger_pin.views.viewer.solids import (
+    CAMERA_DIRECTION,
+    FORCE_COLOUR,
+    Solid,
+    link_names,
+    link_solids,
+    strand_colours,
+    tension_colours,
+    tension_scale,
+)
 
 _BACKGROUND, _INK, _DIM_INK, _TRACE_COLOUR = "#1B2330", "#E8ECF2", "#9AA6B6", "#FF86B4"
-#: From the finger to the camera, in the scene, where z is up; the page's oblique view.
-_CAMERA_DIRECTION = (0.42, -1.0, 0.5)
 #: Pixels of a film's width, and of that of a GIF, which is large for its size.
 _WIDTH, _GIF_WIDTH = 1200, 720
 _FIGURE_SIZE = (10.0, 6.0)
@@ -159,7 +165,7 @@ class _Film:
                 np.concatenate([self.poses.translation, poses[..., :3]], axis=1),
             )
         self.scale = tension_scale(motion.largest)
-        direction = np.array(_CAMERA_DIRECTION) / np.linalg.norm(_CAMERA_DIRECTION)
+        direction = CAMERA_DIRECTION / np.linalg.norm(CAMERA_DIRECTION)
         right = np.cross([0.0, 0.0, 1.0], direction)
         right /= np.linalg.norm(right)
         # Rows: to the right, up, and towards the camera, in the base frame.

@@ -13,7 +13,7 @@ import finger_pin as fp
 from finger_pin.views import draw, write_animation
 from finger_pin.views.plots.style import new_figure
 from finger_pin.views.viewer.animation import Playback, animation_page
-from finger_pin.views.viewer.colours import FORCE_COLOUR
+from finger_pin.views.viewer.solids import FORCE_COLOUR
 from finger_pin.views.viewer.video import _Film
 
 
