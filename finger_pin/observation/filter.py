@@ -29,7 +29,7 @@ from finger_pin.core.jit import (
     Vector,
     call_at,
     njit_inline,
-    njit_reassociate,
+    sum_products,
     unpack,
 )
 
@@ -112,15 +112,6 @@ def _fill_map(args: FilterArgs) -> None:
             args.map[i, size + forces + c] = args.derivatives[i, parameters + c]
 
 
-@njit_reassociate
-def _dot(first: Vector, second: Vector) -> float:
-    """Return the sum of products of two arrays of one length, in any order."""
-    total = 0.0
-    for c in range(first.size):
-        total += first[c] * second[c]
-    return total
-
-
 @njit_inline
 def _propagate(args: FilterArgs) -> None:
     """Propagate P over a period."""
@@ -139,7 +130,7 @@ def _propagate(args: FilterArgs) -> None:
                     product[i, k] += factor * p[k, k]
     for i in range(size):
         for j in range(i + 1):
-            total = _dot(product[i], args.map[j])
+            total = sum_products(product[i], args.map[j], wide)
             for u in range(args.input_variance.size):
                 total += args.derivatives[i, size + u] * args.input_variance[u] * args.derivatives[j, size + u]
             p[i, j] = p[j, i] = total
@@ -270,7 +261,7 @@ def spread(address: int, _time: float) -> int:
             slope[i] = args.slopes[s, args.columns[i]]
         for i in range(wide):
             if slope[i] != 0.0:
-                total += slope[i] * _dot(p[i], slope)
+                total += slope[i] * sum_products(p[i], slope, wide)
         args.signal_variance[s] = max(total, 0.0)
     for i in range(args.considered.size):
         total = 0.0

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger_pin.core.jit import Vector, njit_inline, njit_reassociate
+from finger_pin.core.jit import Vector, njit_inline
 
 _TWO_OVER_PI = 0.6366197723675814
 # pi / 2 in parts of 33 bits, whose products with small integers are exact.
@@ -84,12 +84,3 @@ def sine_cosine(angle: float) -> tuple[float, float]:
     if quarter == 2:
         return -sine, -cosine
     return -cosine, sine
-
-
-@njit_reassociate
-def product(first: Vector, second: Vector, size: int) -> float:
-    """Return the sum of products of the first numbers of two arrays, in any order."""
-    total = 0.0
-    for c in range(size):
-        total += first[c] * second[c]
-    return total

@@ -14,7 +14,6 @@ r, so right-hand sides and gains are kept as matrices: a stage costs a product w
 from __future__ import annotations
 
 from finger_pin.core.addresses.law_code import SLOPE
-from finger_pin.core.addresses.spatial import product
 from finger_pin.core.evaluation.blocks import add_contact_gain, extent, factorise, substitute
 from finger_pin.core.evaluation.readings import add_readings, resolve_readings
 from finger_pin.core.jit import (
@@ -25,6 +24,7 @@ from finger_pin.core.jit import (
     copy,
     njit_always_inline,
     njit_inline,
+    sum_products,
     unpack,
 )
 from finger_pin.core.tables.linear_systems import Linear
@@ -238,7 +238,7 @@ def _solve_velocities(linear: Linear, begin: int, width: int, wide: int) -> None
     """Replace r of a block's positions and velocities by their changes."""
     right, change, inverse = linear.right, linear.change, linear.inverse_shift[0]
     for i in range(width):
-        change[i] = product(linear.velocity[begin + i], right, wide)
+        change[i] = sum_products(linear.velocity[begin + i], right, wide)
     substitute(linear.reduced[begin : begin + width], width, linear.pivots[begin : begin + width], change)
     # Gains multiply dq = (r_q + dv) / g and dv.
     for i in range(width):
@@ -257,7 +257,7 @@ def solve(linear: Linear, r: Vector, u: Vector) -> None:
         for i in range(2 * whole):
             u[i] = right[i]
         for s in range(u.size - 2 * whole):
-            u[2 * whole + s] = product(linear.state_gain[s], right, r.size)
+            u[2 * whole + s] = sum_products(linear.state_gain[s], right, r.size)
         return
     for index in range(blocks.active_state_count[0]):
         s = blocks.active_states[index]
@@ -280,9 +280,9 @@ def solve(linear: Linear, r: Vector, u: Vector) -> None:
         touching = slips * (blocks.touch_start[b + 1] - blocks.touch_start[b])
         for c in range(touching):
             gain, own = linear.contact_state_gain[states[c]], 2 * width + c - c % slips
-            change = product(gain, right, 2 * width)
+            change = sum_products(gain, right, 2 * width)
             for j in range(slips):
                 change += gain[2 * width + j] * right[own + j]
             u[2 * whole + states[c]] = change
         for s in states[touching:]:
-            u[2 * whole + s] = product(linear.state_gain[s - first], right, wide)
+            u[2 * whole + s] = sum_products(linear.state_gain[s - first], right, wide)

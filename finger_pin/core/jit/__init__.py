@@ -18,6 +18,7 @@ from finger_pin.core.jit.calls import (
     numbers,
     put,
     scratch,
+    sum_products,
     view,
 )
 from finger_pin.core.jit.functions import (
@@ -65,6 +66,7 @@ __all__ = [
     "put",
     "refuse_copy",
     "scratch",
+    "sum_products",
     "types",
     "unpack",
     "view",

@@ -9,7 +9,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from finger_pin.core.jit.functions import njit_inline
+from finger_pin.core.jit.functions import njit_inline, njit_reassociate
 from finger_pin.core.jit.struct_types import Matrix, Vector
 
 # Callers see another signature than numba's.
@@ -144,3 +144,12 @@ def copy_matrix(source: Matrix, target: Matrix) -> None:
     for r in range(source.shape[0]):
         for c in range(source.shape[1]):
             target[r, c] = source[r, c]
+
+
+@njit_reassociate
+def sum_products(first: Vector, second: Vector, size: int) -> float:
+    """Return the sum of products of the first numbers of two arrays, in any order."""
+    total = 0.0
+    for c in range(size):
+        total += first[c] * second[c]
+    return total

@@ -234,9 +234,9 @@ def limit_bristles(address: int, _time: float) -> int:
 
 
 @njit_inline
-def _sum_rows(period: PeriodArgs, address: int, signal: int) -> float:
-    """Return a signal that is watched, after an evaluation of a model."""
-    rows, weights, total = unpack(address, MODEL).work.rows, period.weights_of_rows, 0.0
+def _sum_rows(period: PeriodArgs, rows: Matrix, signal: int) -> float:
+    """Return a signal that is watched, after an evaluation."""
+    weights, total = period.weights_of_rows, 0.0
     for k in range(rows.shape[1]):
         total += weights[0, k, signal] * rows[ROW.force, k] + weights[1, k, signal] * rows[ROW.command, k]
     return total
@@ -244,7 +244,7 @@ def _sum_rows(period: PeriodArgs, address: int, signal: int) -> float:
 
 @njit_inline
 def _add_slopes(period: PeriodArgs, rows: Matrix, column: int, begin: int, end: int) -> None:
-    """Add to the derivatives of the signals that are watched what some rows differ by from those kept."""
+    """Add the differences of some rows from those kept to the derivatives of the signals that are watched."""
     weights, kept, step = period.weights_of_rows, period.plain_rows, period.steps[column]
     for k in range(begin, end):
         force = (rows[ROW.force, k] - kept[ROW.force, k]) / step
@@ -263,7 +263,7 @@ def fill_watched(address: int, _time: float) -> int:
     evaluate_plain(period.plain, state, False)
     keep_rows(period, plain)
     for s in range(period.watched.size):
-        period.watched[s] = _sum_rows(period, period.plain, s)
+        period.watched[s] = _sum_rows(period, plain.work.rows, s)
         for c in range(period.steps.size):
             period.slopes[s, c] = 0.0
     for c in range(size, period.steps.size):
