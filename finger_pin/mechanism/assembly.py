@@ -24,7 +24,7 @@ from finger_pin.mechanism.servos import Actuators
 from finger_pin.mechanism.sheaths import in_sheaths
 from finger_pin.mechanism.sources import source_rows
 from finger_pin.mechanism.state import BLOCKS, Layout
-from finger_pin.mechanism.tendons import Places, Tendons
+from finger_pin.mechanism.tendons import Tendons
 from finger_pin.mechanism.tree_mechanism import TreePaths, along_paths
 from finger_pin.mechanism.wiring import replace_tables
 from finger_pin.typing import Array
@@ -78,7 +78,6 @@ class Assembly(NamedTuple):
         drive_matrices: Weights with which drives and passive tendons' hysteresis pull the strands, by table, (s, k).
         wraps: By table of wraps beyond the first ones, which row is of which tendon, shape (t, rows).
         extra_rows: Tables beside the paper's: those of a tree, canals, hysteresis, and rows of the user's own.
-        places: By table of friction of tendons, arguments of `Tendons.at`; none where more than that follows from it.
     """
 
     mechanism: Mechanism
@@ -87,7 +86,6 @@ class Assembly(NamedTuple):
     drive_matrices: dict[str, Array]
     wraps: dict[str, Array]
     extra_rows: tuple[Rows, ...]
-    places: dict[str, Places]
 
 
 def assemble(
@@ -111,7 +109,7 @@ def assemble(
     dry_friction = [of_tree.pop(group) for group in ("tendon_dry_friction",) if group in of_tree]
     custom_drives = [table for table in args.rows if table.pulls]
     pulling = [*actuators.tendon_rows(width), *source_rows(description, routing, width)]
-    pulling, sheaths = in_sheaths(description, tendons.friction, pulling)
+    pulling, sheaths = in_sheaths(tendons, pulling)
     drives = (*pulling, *sheaths[:2], *custom_drives)
     matrices = tendons.drive_matrices(drives)
     tendon_rows = [along_paths(description, paths, table) for table in tendons.rows(drives, len(actuators.inertias))]
@@ -144,8 +142,7 @@ def assemble(
     layout = _state_layout(parts, further, scene, [*of_tree.values()], canals.tables, body.slides)
     check_layout(layout, mechanism)
     extra_rows = (*of_tree.values(), *canals.tables, *further)
-    places = {} if sheaths or args.tables else canals.places | tendons.places
-    return Assembly(mechanism, scene, layout, matrices, canals.wraps, extra_rows, places)
+    return Assembly(mechanism, scene, layout, matrices, canals.wraps, extra_rows)
 
 
 def _numbers_on_paths(description: FingerDescription, width: int) -> NDArray[np.int64]:

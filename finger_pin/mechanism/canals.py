@@ -23,7 +23,7 @@ from finger_pin.laws.capstan import CANAL_FRICTION, CORD_TENSION
 from finger_pin.mechanism.groups import BRANCHES, CANALS, CORDS, ELASTIC, SOURCES, TENDON_LOSSES, WRAPS
 from finger_pin.mechanism.rows import Rows
 from finger_pin.mechanism.tendon_paths import TendonPaths
-from finger_pin.mechanism.tendons import BRISTLES, SLACK, Places, Tendons
+from finger_pin.mechanism.tendons import BRISTLES, SLACK, Tendons, numbers_at
 from finger_pin.mechanism.tree_mechanism import actuator_table
 from finger_pin.typing import Array
 
@@ -34,7 +34,6 @@ class Canals:
     Attributes:
         tables: Their rows, none without any.
         loads: By table, weights with which rows load the pins of joints, shape (n, rows).
-        places: By table, arguments of `Tendons.at` for its numbers of friction.
         wraps: By table of the own tendons' wraps, which row is of which tendon, shape (t, rows).
     """
 
@@ -61,7 +60,6 @@ class Canals:
         self._joints, self._width = tuple(description.joints), width
         self.tables: list[Rows] = []
         self.loads: dict[str, Array] = {}
-        self.places: dict[str, Places] = {}
         # They load the pins by themselves.
         self._loading = {"driven_tendons", *drive_matrices}
         rubbing = self._tree.rubbing
@@ -175,12 +173,12 @@ class Canals:
         arm[:, : len(self._joints)] = arms
         bends[:, : len(self._joints)] = [wrap.turns(self._joints) for wrap in wraps]
         # Drag is that of the whole tendon, before it is divided.
-        self.places[group] = tendons, wraps, not group.startswith(BRANCHES)
+        source = numbers_at(tendons, wraps, not group.startswith(BRANCHES))
         return Rows(
             group=group,
             law=CANAL_FRICTION,
             names=tuple(names),
-            parameters=np.vstack([self._tendons.at(*self.places[group]), self._one_way[tendons]]),
+            parameters=np.vstack([source.numbers(self._tendons), self._one_way[tendons]]),
             arm=arm,
             inputs=inputs,
             bends=bends,
@@ -188,6 +186,7 @@ class Canals:
             paths=paths,
             stored=BRISTLES,
             powers=(*TENDON_LOSSES, SLACK),
+            source=source,
         )
 
     def _load_pins(self, wraps: Sequence[Cord], tension: Mapping[str, Array]) -> None:

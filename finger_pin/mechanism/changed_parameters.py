@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
+from dataclasses import replace
 from typing import Any
 
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.objects import Object
-from finger_pin.mechanism.joints import JointFriction, StrokeLimiter
 from finger_pin.mechanism.object_scene import Scene
-from finger_pin.mechanism.rows import Rows
-from finger_pin.mechanism.tendons import Tendons
-from finger_pin.typing import Array
 
-# Entries that change parameters of laws, inertias and motions alone: of a finger, an object and a palm.
-_LAWS = {"tendon_friction", "joint_friction", "stroke_limiter"}
+# Entries of an object and of a palm that change masses and motions alone.
 _OF_OBJECT, _OF_PALM = {"mass", "path"}, {"path"}
 
 
@@ -24,35 +20,28 @@ def with_changed_parameters(
 ) -> Any | None:
     """Return the `Finger` of another description and other objects, on the same wiring.
 
-    It is None if more differs than friction and stops, masses of objects, and paths of these and of the palm.
+    It is None if more differs than numbers of rows that have a `Source`, masses of objects, and paths of these and of
+    the palm.
     """
-    args = finger.constructor_args
-    if not finger.places or (objects is None) != (args.objects is None):
+    args, old = finger.constructor_args, finger.description
+    parts = {name: replace(part, description=description) for name, part in vars(finger).items() if _has_entry(part)}
+    entries = {part.ENTRY for part in parts.values()}
+    if args.tables or (objects is None) != (args.objects is None) or not _same_wiring(entries, old, description):
         return None
-    if not _same_wiring(finger.description, description):
-        return None
-    scene, friction = _scene(finger, description, objects), JointFriction(description, finger.routing)
+    scene, law = _scene(finger, description, objects), parts["joint_friction"].law
     # Names of custom laws may stand for other ones by now.
-    if (scene is None) != (finger.scene is None) or all(each.law is not friction.law for each in finger.mechanism.rows):
+    if (scene is None) != (finger.scene is None) or all(each.law is not law for each in finger.mechanism.rows):
         return None
-    twin, limiter, tendons = copy.copy(finger), StrokeLimiter(description), Tendons(description, finger.routing)
+    twin = copy.copy(finger)
     # Signals stay, which copies leave out.
-    twin.__dict__ |= vars(finger)
-    twin.description, twin.constructor_args = description, args._replace(objects=objects)
-    twin.tendons, twin.joint_friction, twin.stroke_limiter, twin.scene = tendons, friction, limiter, scene
-    old, parameters = finger.description, dict[str, Array]()
-    if description.tendon_friction is not old.tendon_friction:
-        parameters |= {group: tendons.at(*places) for group, places in finger.places.items()}
-    if description.joint_friction is not old.joint_friction:
-        parameters["joint_friction"] = friction.parameters
-    if description.stroke_limiter is not old.stroke_limiter:
-        parameters["limiter"] = limiter.parameters
-
-    def changed(tables: Sequence[Rows]) -> tuple[Rows, ...]:
-        return tuple([each.with_parameters(parameters.get(each.group)) for each in tables])
-
+    twin.__dict__ |= vars(finger) | parts
+    twin.description, twin.constructor_args, twin.scene = description, args._replace(objects=objects), scene
+    changed = {
+        name: part for name, part in parts.items() if getattr(old, part.ENTRY) is not getattr(description, part.ENTRY)
+    }
     before, twin.mechanism = finger.mechanism, copy.copy(finger.mechanism)
-    twin.mechanism.listed, twin.extra_rows = changed(before.listed), changed(finger.extra_rows)
+    twin.mechanism.listed = tuple(each.of_parts(changed) for each in before.listed)
+    twin.extra_rows = tuple(each.of_parts(changed) for each in finger.extra_rows)
     by_group = {table.group: table for table in twin.mechanism.listed}
     twin.mechanism.rows = tuple([by_group[table.group] for table in before.rows])
     if scene is not None:
@@ -75,21 +64,31 @@ def _scene(finger: Any, description: FingerDescription, objects: Mapping[str, Ob
     return scene.with_masses(around, finger.rigid_body, after if finger.mechanism.moved else None)
 
 
-def _same_wiring(first: FingerDescription, second: FingerDescription) -> bool:
-    """Return whether two descriptions differ in parameters of laws and in the path of a palm alone."""
+def _has_entry(part: Any) -> bool:
+    return hasattr(part, "ENTRY")
+
+
+def _same_wiring(entries: Collection[str], first: FingerDescription, second: FingerDescription) -> bool:
+    """Return whether two descriptions differ in numbers of some entries and in the path of a palm alone."""
     if first is second:
         return True
     one, other = first.hand, second.hand
-    same = _same_but(_LAWS, first, second) and first.tendon_friction.place == second.tendon_friction.place
+    same = _same_but(entries, first, second) and _choices(entries, first) == _choices(entries, second)
     if not same or one is None or other is None:
         return same and one is other
-    fingers = list(zip(one.fingers.values(), other.fingers.values(), strict=False))
+    fingers = [each.finger for each in one.fingers.values()], [each.finger for each in other.fingers.values()]
     return (
         _same_but({"fingers", "palm"}, one, other)
         and _same_but(_OF_PALM, one.palm, other.palm)
         and [*one.fingers] == [*other.fingers]
-        and all(_same_but({"finger"}, *pair) and _same_wiring(*(each.finger for each in pair)) for pair in fingers)
+        and all(_same_but({"finger"}, *pair) for pair in zip(one.fingers.values(), other.fingers.values(), strict=True))
+        and all(_same_wiring(entries, *pair) for pair in zip(*fingers, strict=True))
     )
+
+
+def _choices(entries: Collection[str], description: FingerDescription) -> list[str]:
+    """Return what entries choose by words, such as where tendons rub."""
+    return [word for key in entries for _, word in getattr(description, key) or () if isinstance(word, str)]
 
 
 def _same_but(changing: Collection[str], first: Any, second: Any) -> bool:

@@ -46,7 +46,6 @@ class Finger:
         mechanism: All of it as coordinates and rows.
         paths: The tendons as functions of the posture.
         extra_rows: Tables of rows that were added, those of a tree first.
-        places: By table of friction of tendons, arguments of `Tendons.at`; none where more follows from it.
         wraps: By table of wraps beyond the first ones, which row is of which tendon, shape (t, rows).
         drive_matrices: Weights with which drives and passive tendons' hysteresis pull the strands, by table, (s, k).
         constructor_args: What it was built from besides its description.
@@ -87,7 +86,7 @@ class Finger:
         self.routing, self.tendons, self.actuators, self.joint_friction, self.stroke_limiter, self.springs = parts
         self.visuals: pin.GeometryModel | None = None
         whole = assemble(description, self.rigid_body, self.paths, parts, self.constructor_args)
-        self.mechanism, self.scene, self.layout, self.drive_matrices, self.wraps, self.extra_rows, self.places = whole
+        self.mechanism, self.scene, self.layout, self.drive_matrices, self.wraps, self.extra_rows = whole
 
     def __repr__(self) -> str:
         """Return name, joints and tendons."""
@@ -153,7 +152,7 @@ class Finger:
         whole, joints = self.mechanism, len(self.routing.joints)
         prescribed = np.append(np.arange(joints), np.full(whole.coordinates - joints, -1))
         parts = whole.body, whole.listed, whole.lumps, whole.inertia, whole.channels
-        finger.mechanism, finger.places = Mechanism(*parts, prescribed=prescribed, tendons=whole.tendons), {}
+        finger.mechanism = Mechanism(*parts, prescribed=prescribed, tendons=whole.tendons)
         return finger
 
     @property

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from operator import attrgetter
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +22,7 @@ from finger_pin.laws.limiter import STROKE_LIMITER
 from finger_pin.laws.spring import BRISTLE_RATIO, HYSTERESIS, JOINT_SPRING, spring_torque
 from finger_pin.mechanism.groups import JOINT_LOSSES
 from finger_pin.mechanism.joint_laws import joint_law
-from finger_pin.mechanism.rows import Energy, Rows, energy
+from finger_pin.mechanism.rows import Energy, Rows, Source, energy
 from finger_pin.typing import Array
 
 #: Least levels of what tendons, N, and joints' springs, N m, hold, as those of their friction.
@@ -44,6 +46,8 @@ class JointFriction:
         description: The finger.
         routing: Its routing.
     """
+
+    ENTRY: ClassVar = "joint_friction"
 
     description: FingerDescription
     routing: Routing
@@ -142,6 +146,7 @@ class JointFriction:
             pins=np.where(bearing, np.arange(len(bearing)), -1),
             stored=Energy("joint_bristles", "joint bristles"),
             powers=tuple(_POWERS.get(name) or energy(f"joint_{name}") for name in (*law.supplies, *law.losses)),
+            source=Source("joint_friction", attrgetter("parameters")),
         )
 
 
@@ -154,6 +159,8 @@ def static_drag(drag: Array, kinetic: Array, static: Array) -> Array:
 @dataclass(frozen=True, eq=False)
 class StrokeLimiter:
     """Stroke limiters of all joints, by the numbers of a description."""
+
+    ENTRY: ClassVar = "stroke_limiter"
 
     description: FingerDescription
 
@@ -194,6 +201,7 @@ class StrokeLimiter:
             arm=np.eye(len(self.description.joints), width),
             stored=_LIMITERS,
             powers=(_LIMITERS,),
+            source=Source("stroke_limiter", attrgetter("parameters")),
         )
 
 

@@ -8,7 +8,7 @@ tables read them, whatever the order in which tables are listed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -75,6 +75,18 @@ def _unique(energies: Iterable[Energy]) -> tuple[Energy, ...]:
     return tuple(by_name.values())
 
 
+class Source(NamedTuple):
+    """Where the first parameters of a table's law come from.
+
+    Attributes:
+        part: Attribute of `Finger`: a part that names an ``ENTRY`` of its description, of which they are the numbers.
+        numbers: Gives them, shape (at most all, k), of that part.
+    """
+
+    part: str
+    numbers: Callable[[Any], Array]
+
+
 @dataclass(frozen=True, eq=False)
 class Rows:
     """A table of rows that share a law; k rows, N coordinates.
@@ -106,6 +118,7 @@ class Rows:
         unit: Of the rows' length, ``m`` or ``rad``; SI by default.
         pulls: For drives, the names of the tendons that they pull, one for each row: its force is a tension at the
             canal's entrance, its arm the tendon's. What several exert on one tendon adds up.
+        source: Of numbers that change with a description's while all else of the table stays.
     """
 
     group: str
@@ -128,6 +141,7 @@ class Rows:
     powers: tuple[Energy, ...] = ()
     unit: str = ""
     pulls: tuple[str, ...] = ()
+    source: Source | None = None
 
     def __post_init__(self) -> None:
         """Fill in defaults, and check the sizes."""
@@ -201,11 +215,11 @@ class Rows:
 
         return replace(self, arm=wide(self.arm), measure=wide(self.measure), bends=wide(self.bends))
 
-    def with_parameters(self, parameters: Array | None) -> Rows:
-        """Return the same rows with other first parameters of the law, shape (at most all, k); itself without any."""
-        if parameters is None:
+    def of_parts(self, parts: Mapping[str, Any]) -> Rows:
+        """Return the same rows with their numbers of other parts of the finger; itself where they come of none."""
+        if self.source is None or self.source.part not in parts:
             return self
-        rows = object.__new__(Rows)
+        parameters, rows = self.source.numbers(parts[self.source.part]), object.__new__(Rows)
         vars(rows).update(vars(self), parameters=np.vstack([parameters, self.parameters[len(parameters) :]]))
         return rows
 

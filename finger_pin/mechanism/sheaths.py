@@ -8,17 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from finger_pin.description.cords import DriveCord
-from finger_pin.description.finger_description import FingerDescription
 from finger_pin.exceptions import InputError
 from finger_pin.laws.capstan import PASSIVE_FRICTION
 from finger_pin.laws.sheath import SHEATH_PIECE, SHEATH_PLACE, SHEATH_SLIP, SPOOL_ENTRANCE, WOUND_ENTRANCE
 from finger_pin.mechanism.groups import TENDON_LOSSES, WINCHES
-from finger_pin.mechanism.rows import Energy, Rows
+from finger_pin.mechanism.rows import Energy, Rows, Source
+from finger_pin.mechanism.tendons import Tendons
 from finger_pin.typing import Array
 
 #: The table of the places where sheathed cords rub.
@@ -62,20 +63,17 @@ class _Cord(NamedTuple):
         return parts
 
 
-def in_sheaths(
-    description: FingerDescription, friction: Array, drives: Sequence[Rows]
-) -> tuple[list[Rows], list[Rows]]:
+def in_sheaths(tendons: Tendons, drives: Sequence[Rows]) -> tuple[list[Rows], list[Rows]]:
     """Return drives with the entrances of sheathed cords in place of whole cords, then places and pieces, if any.
 
     Args:
-        description: The finger.
-        friction: Parameters of `PASSIVE_FRICTION` of its tendons, shape (f, t or more).
+        tendons: Of the finger.
         drives: Tables of winches and of tendons on spools among them.
 
     Raises:
         InputError: If a sheathed cord has a stiction ratio above 1: where it slips there would be no one speed.
     """
-    wound, cords, first = description.drive_cords, list[_Cord](), 0
+    wound, cords, first = tendons.description.drive_cords, list[_Cord](), 0
     for table in drives:
         for row, name in enumerate(table.pulls):
             if name in wound and (count := wound[name].pieces):
@@ -83,14 +81,8 @@ def in_sheaths(
                 first += count
     if not cords:
         return [*drives], []
-    columns = [[*description.tendons].index(cord.name) for cord in cords]
-    rubbing = dict(zip(PASSIVE_FRICTION.parameters, friction[:, columns], strict=True))
-    for cord, ratio in zip(cords, rubbing["ratio"].tolist(), strict=True):
-        if ratio != 1.0:
-            allowed = f"must be 1 where a cord stretches within its sheath, as {cord.name} does by its pieces"
-            raise InputError("finger.tendon_friction.stiction_ratio", allowed, ratio)
     entered = [_entrances(table, wound, [cord for cord in cords if cord.table is table], first) for table in drives]
-    places = _places(description, entered, cords, rubbing)
+    places = _places(tendons, entered, cords)
     return entered, [places, _slips(places, cords), _pieces(places, cords)]
 
 
@@ -112,33 +104,23 @@ def _entrances(table: Rows, wound: Mapping[str, DriveCord], cords: Sequence[_Cor
     return replace(table, law=law, parameters=parameters, offset=offset, readings={_SLIPS: reading})
 
 
-def _places(
-    description: FingerDescription, drives: Sequence[Rows], cords: Sequence[_Cord], rubbing: Mapping[str, Array]
-) -> Rows:
+def _places(tendons: Tendons, drives: Sequence[Rows], cords: Sequence[_Cord]) -> Rows:
     """Return the table of places where cords rub, along their tendons."""
-    count = sum(len(cord.shares) for cord in cords)
+    count, description, source = sum(len(cord.shares) for cord in cords), tendons.description, partial(_numbers, cords)
     before = {_PIECES: np.zeros((count, count))} | {each.group: np.zeros((count, each.count)) for each in drives}
-    arm, turns, parameters = np.zeros((count, drives[0].arm.shape[1])), np.zeros(count), list[Array]()
-    for k, cord in enumerate(cords):
+    arm, turns = np.zeros((count, drives[0].arm.shape[1])), np.zeros(count)
+    for cord in cords:
         path = description.cord(cord.name)
         own = np.arange(cord.first, cord.first + len(cord.shares))
         before[cord.table.group][own[0], cord.row] = before[_PIECES][own[1:], own[:-1]] = 1.0
         arm[own, : len(description.joints)] = path.arms(list(description.joints))
         turns[own] = cord.shares * path.curvature_offset
-        # The sheath is one of the places that share what has no load.
-        viscous, drag = (rubbing[key][k] / (1 + len(path.wraps)) for key in ("viscous", "drag"))
-        viscous = max(cord.whole.damping + viscous, _RELAXATION * cord.whole.stiffness)
-        beside = cord.whole.stiffness * (1.0 / cord.compliances[:-1] + 1.0 / cord.compliances[1:])
-        # Places move as fast as they can without ringing.
-        mass, wound = 0.25 * (viscous * cord.shares) ** 2 / beside, float(cord.table.group == WINCHES)
-        values = rubbing["surface"][k], mass, viscous * cord.shares, drag * cord.shares, wound
-        parameters.append(np.array(np.broadcast_arrays(*values)))
     names = [(cord.name, f"{cord.name}.{number}") for cord in cords for number in range(1, 1 + len(cord.shares))]
     return Rows(
         SHEATHS,
         SHEATH_PLACE,
         tuple(name for _, name in names),
-        np.hstack(parameters),
+        source(tendons),
         arm,
         inputs={_PIECES: np.eye(count)},
         loads={group: weights for group, weights in before.items() if np.any(weights)},
@@ -146,7 +128,28 @@ def _places(
         stored=_stored(cords),
         powers=(WINCH_ENERGY, *TENDON_LOSSES[:2]),
         pulls=tuple(tendon for tendon, _ in names),
+        source=Source("tendons", source),
     )
+
+
+def _numbers(cords: Sequence[_Cord], tendons: Tendons) -> Array:
+    """Return the numbers of `SHEATH_PLACE` at the places of cords, shape (parameters, places)."""
+    columns, parameters = [tendons.routing.tendons.index(cord.name) for cord in cords], list[Array]()
+    rubbing = dict(zip(PASSIVE_FRICTION.parameters, tendons.friction[:, columns], strict=True))
+    for k, cord in enumerate(cords):
+        if (ratio := rubbing["ratio"][k]) != 1.0:
+            allowed = f"must be 1 where a cord stretches within its sheath, as {cord.name} does by its pieces"
+            raise InputError("finger.tendon_friction.stiction_ratio", allowed, float(ratio))
+        # The sheath is one of the places that share what has no load.
+        sharing = 1 + len(tendons.description.cord(cord.name).wraps)
+        viscous, drag = (rubbing[key][k] / sharing for key in ("viscous", "drag"))
+        viscous = max(cord.whole.damping + viscous, _RELAXATION * cord.whole.stiffness)
+        beside = cord.whole.stiffness * (1.0 / cord.compliances[:-1] + 1.0 / cord.compliances[1:])
+        # Places move as fast as they can without ringing.
+        mass, wound = 0.25 * (viscous * cord.shares) ** 2 / beside, float(cord.table.group == WINCHES)
+        values = rubbing["surface"][k], mass, viscous * cord.shares, drag * cord.shares, wound
+        parameters.append(np.array(np.broadcast_arrays(*values)))
+    return np.hstack(parameters)
 
 
 def _slips(places: Rows, cords: Sequence[_Cord]) -> Rows:
@@ -163,6 +166,7 @@ def _slips(places: Rows, cords: Sequence[_Cord]) -> Rows:
         readings=reading,
         curvature_offset=np.zeros(places.count),
         powers=(),
+        source=None,
     )
 
 

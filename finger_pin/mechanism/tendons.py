@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from operator import methodcaller
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from finger_pin.laws.capstan import DRIVEN_TENDON, PASSIVE_FRICTION, UNLIMITED_F
 from finger_pin.laws.spring import TENDON_HALF
 from finger_pin.mechanism.groups import SOURCES, TENDON_LOSSES, TIES
 from finger_pin.mechanism.joints import OF_TENDONS, hysteresis_rows
-from finger_pin.mechanism.rows import Energy, Rows
+from finger_pin.mechanism.rows import Energy, Rows, Source
 from finger_pin.mechanism.wiring import drive_matrices
 from finger_pin.typing import Array, Number
 
@@ -28,9 +29,6 @@ SLACK = Energy("slack", "tensions cut at zero")
 BRISTLES = Energy("tendon_bristles", "tendon bristles")
 _HALVES = ("proximal", "distal")
 _HYSTERESIS_ENERGY = Energy("passive_hysteresis", "passive tendons stretching")
-
-#: Indices of tendons, the place of each, and whether their drag counts there.
-Places: TypeAlias = tuple[Sequence[int], Sequence[Cord], bool]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +39,8 @@ class Tendons:
         description: The finger.
         routing: Its cords, and their matrices.
     """
+
+    ENTRY: ClassVar = "tendon_friction"
 
     description: FingerDescription
     routing: Routing
@@ -242,7 +242,6 @@ class Tendons:
         driven[actuated:] = np.eye(passive, width, joints)
         bends[:, :joints] = routing.first_turns
         offset, names = np.array([wrap.offset for wrap in first]), routing.passive_names
-        friction = {group: self.at(*places) for group, places in self.places.items()}
         wired = self._pulls(drives)
         replaced = np.any(np.hstack([np.zeros((actuated, 0)), *wired.values()]), axis=1)
         least = np.where(self.coupled[:actuated].any(axis=1), -UNLIMITED_FORCE, 0.0)
@@ -256,7 +255,7 @@ class Tendons:
                 group="driven_tendons",
                 law=DRIVEN_TENDON,
                 names=routing.tendons[:actuated],
-                parameters=np.vstack([friction["driven_tendons"], replaced, least]),
+                parameters=np.vstack([self.at(range(actuated), first[:actuated]), replaced, least]),
                 arm=driven[:actuated],
                 channels=np.where(replaced, -1, np.arange(actuated)),
                 inputs=wired,
@@ -264,29 +263,22 @@ class Tendons:
                 curvature_offset=offset[:actuated],
                 stored=BRISTLES,
                 powers=(SOURCES, *TENDON_LOSSES, SLACK),
+                source=numbers_at(range(actuated), first[:actuated]),
             ),
             Rows(
                 group="passive_tendons",
                 law=PASSIVE_FRICTION,
                 names=names,
-                parameters=friction["passive_tendons"],
+                parameters=self.at(range(actuated, len(first)), first[actuated:]),
                 arm=driven[actuated:],
                 loads=loads,
                 bends=bends[actuated:],
                 curvature_offset=offset[actuated:],
                 stored=BRISTLES,
                 powers=TENDON_LOSSES,
+                source=numbers_at(range(actuated, len(first)), first[actuated:]),
             ),
         ]
-
-    @property
-    def places(self) -> dict[str, Places]:
-        """By table, arguments of `at` for the numbers of its tendons at their first places."""
-        actuated, first = self.routing.actuated, [places[0] for places in self.wraps[: len(self.routing.tendons)]]
-        return {
-            "driven_tendons": (range(actuated), first[:actuated], True),
-            "passive_tendons": (range(actuated, len(first)), first[actuated:], True),
-        }
 
     def at(self, tendons: Sequence[int], wraps: Sequence[Cord], drags: bool = True) -> Array:
         """Return the numbers of `friction` of some tendons at some of their places, shape (f, k); drag if asked."""
@@ -295,3 +287,8 @@ class Tendons:
         friction[shared] *= [wrap.share for wrap in wraps]
         friction[-1] *= drags
         return friction
+
+
+def numbers_at(tendons: Sequence[int], wraps: Sequence[Cord], drags: bool = True) -> Source:
+    """Return `Tendons.at` of the arguments as a source of numbers."""
+    return Source("tendons", methodcaller("at", tendons, wraps, drags))

@@ -88,6 +88,11 @@ LEFT = "hand.fingers.left.finger"
 # Beside the finger; of the palm the path alone.
 MOVED = {"hand.palm.path.y.amplitude": 0.01, "environment.objects.ball.mass": 0.04}
 AT_BENDS = {"tendon_friction.place": "bends"}
+SHEATHED = {
+    "actuators.servo.tendon_pieces": 3,
+    "tendons.flexor.curvature_offset": 0.5,
+    "tendon_friction.stiction_ratio": 1.0,
+}
 
 
 @pytest.mark.parametrize(
@@ -95,6 +100,7 @@ AT_BENDS = {"tendon_friction.place": "bends"}
     [
         ("reversals", "finger", {}, {**FRICTION, "stroke_limiter.stiffness": 32.0}, True),
         ("reversals", "finger", AT_BENDS, FRICTION, True),
+        ("wound", "finger", SHEATHED, FRICTION, True),
         ("underactuated", "finger", {}, FRICTION, True),
         ("press", "finger", {}, FRICTION, True),
         ("pinch", LEFT, {}, FRICTION, True),
