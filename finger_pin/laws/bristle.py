@@ -47,6 +47,9 @@ class BristleColumns(NamedTuple):
 
 #: Positions in ``p``; the compiler takes them for constants.
 BRISTLE = BristleColumns()
+# Least power in (9b), 1: of a row that is held on a side it has left by many omega, as where the shortest way of a cord
+# changes to the other side of what it wraps about, exp(|v| / omega) would overflow.
+_LEAST_POWER = -30.0
 
 
 def friction_coefficient(
@@ -65,7 +68,7 @@ def friction_coefficient(
     ratio = magnitude(velocity, side) / stribeck
     # ratio**exponent, exact for 1 and 2, without the cost of a power.
     power = ratio * ((2.0 - exponent) + (exponent - 1.0) * ratio)
-    return kinetic + (static - kinetic) * np.exp(-power)
+    return kinetic + (static - kinetic) * np.exp(-np.maximum(power, _LEAST_POWER))
 
 
 def friction_coefficient_slope(
@@ -74,8 +77,9 @@ def friction_coefficient_slope(
     """Return dM/dv of (9b)."""
     ratio = magnitude(velocity, side) / stribeck
     power = ratio * ((2.0 - exponent) + (exponent - 1.0) * ratio)
-    power_slope = (2.0 - exponent) + 2.0 * (exponent - 1.0) * ratio
-    return -direction(velocity, side) * (static - kinetic) / stribeck * power_slope * np.exp(-power)
+    power_slope = ((2.0 - exponent) + 2.0 * (exponent - 1.0) * ratio) * (power > _LEAST_POWER)
+    fallen = np.exp(-np.maximum(power, _LEAST_POWER))
+    return -direction(velocity, side) * (static - kinetic) / stribeck * power_slope * fallen
 
 
 def friction_level(normal: Number, coefficient: Number, floor: Number, drag: Number = 0.0) -> Number:

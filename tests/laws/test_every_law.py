@@ -71,6 +71,17 @@ def test_slopes_are_the_derivatives_of_the_value(drawn):
         assert np.all(np.abs(rate - rate_slope) <= 1e-11 * np.abs(rate_slope)), name
 
 
+def test_a_law_that_is_held_on_a_side_of_its_kink_is_finite_far_beyond_it_and_without_load(drawn):
+    """Unloaded, as a cord is that lets go where its shortest way changes sides: 0 times what overflows is no number."""
+    law, row, p = drawn
+    nothing = np.zeros(COUNT)
+    row = row._replace(side=np.resize([1.0, -1.0], COUNT), speed=3e3 * row.speed, load=nothing, command=nothing)
+    with np.errstate(over="raise", invalid="raise"):
+        value = law.value(row, p)
+        slopes = law.slopes(row, p, value[2:])
+    assert all(np.all(np.isfinite(each)) for each in (*value, *slopes[0], *slopes[1]))
+
+
 def test_value_slopes_and_account_return_what_the_law_declares(drawn):
     law, row, p = drawn
     force, rate, *signals = law.value(row, p)
