@@ -27,6 +27,7 @@ from .mechanism.finger import Hand as Hand
 from .mechanism.rows import Rows as Rows
 from .mechanism.urdf import to_urdf as to_urdf
 from .observation.observe import observe as observe
+from .playground import play as play
 from .simulation.convergence import check_convergence as check_convergence
 from .simulation.frames import in_world as in_world
 from .simulation.netcdf import load as load
@@ -40,6 +41,5 @@ from .studies import sweep as sweep
 from .studies.batch import simulate_many as simulate_many
 from .version import __version__ as __version__
 from .views import plots as plots
-from .views.playground import play as play
 from .views.plots import plot_fig6 as plot_fig6
 from .views.viewer import view as view

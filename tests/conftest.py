@@ -1,6 +1,7 @@
 """Shared fixtures: the paper's finger, networks made on the spot, and the few expensive runs."""
 
 import importlib
+import json
 import os
 import pkgutil
 import shutil
@@ -177,3 +178,17 @@ def browser(tmp_path_factory):
     window.set_script_timeout(120)
     yield window
     window.quit()
+
+
+@pytest.fixture
+def loaded(browser):
+    """A function that returns what pages have loaded since it was asked last, but for the browser's own pages."""
+
+    def urls():
+        events = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
+        requests = [
+            each["params"]["request"]["url"] for each in events if each["method"] == "Network.requestWillBeSent"
+        ]
+        return [url for url in requests if not url.startswith(("data:", "about:", "blob:", "chrome"))]
+
+    return urls

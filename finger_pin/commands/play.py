@@ -21,7 +21,7 @@ def play(
 ) -> None:
     """Play a scenario in the browser: pull tendons, drag the tip, change friction while it moves."""
     from finger_pin.description.loading import load_scenario
-    from finger_pin.views.playground import play as play_scenario
+    from finger_pin.playground import play as play_scenario
 
     loaded = load_scenario(scenario, overrides(settings))
     play_scenario(loaded, keys=keys, rtol=rtol, port=port, folder=output, open_browser=browser, block=True)

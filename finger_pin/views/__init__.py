@@ -1,4 +1,4 @@
-"""Views of results and analyses: figures (`plots`), the viewer, the summary. It only reads, but for the playground."""
+"""Views of results and analyses: figures (`plots`), the viewer, the summary. It only reads."""
 
 import lazy_loader
 

@@ -1,8 +1,6 @@
-from . import playground as playground
 from . import plots as plots
 from . import viewer as viewer
 from .observation_text import summarize_observed as summarize_observed
-from .playground import play as play
 from .summary import summarize as summarize
 from .viewer import draw as draw
 from .viewer import view as view

@@ -96,7 +96,7 @@ def shown(tmp_path_factory):
         forget_what_ships()
         patch.setattr(studies, "Effort", partial(studies.Effort, population=4, generations=1))
         patch.setattr("finger_pin.views.viewer.page_server.PageHandle.wait", lambda viewing: viewing.close())
-        patch.setattr("finger_pin.views.playground.player.Playground.wait", lambda playing: playing.close())
+        patch.setattr("finger_pin.playground.player.Playground.wait", lambda playing: playing.close())
         patch.setattr("finger_pin.views.plots.figure_files.save_figure", not_painted)
         patch.setattr("finger_pin.views.plots.statics._DIRECTIONS", 12)
         # The comparison of controllers leaves out the start.

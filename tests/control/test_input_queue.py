@@ -8,8 +8,8 @@ import finger_pin as fp
 from finger_pin.control.inputs import InputQueue
 from finger_pin.description.demo_motion import demo_motion
 from finger_pin.description.loading import read_scenario
+from finger_pin.playground.session import Session
 from finger_pin.simulation.simulators import step_many
-from finger_pin.views.playground.session import Session
 
 DELAY = 0.05
 MODEL = """<mujoco><option gravity="0 0 0"/><worldbody><body><joint name="turn" damping="0.02" armature="0.002"/>

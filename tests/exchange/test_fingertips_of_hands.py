@@ -10,7 +10,7 @@ from finger_pin.analysis import equilibrium, force_polytope, inverse_kinematics
 from finger_pin.description.demo_motion import demo_motion
 from finger_pin.description.loading import load_finger, read_scenario
 from finger_pin.learning import Environment
-from finger_pin.views.playground.session import Session
+from finger_pin.playground.session import Session
 
 _HAND = """<mujoco><compiler angle="radian"/><option gravity="0 0 0"/><worldbody>
   <body name="index" pos="0.03 0 0"><joint name="index" axis="0 1 0" range="-1 1"/>

@@ -12,8 +12,8 @@ from finger_pin.description.loading import read_scenario
 from finger_pin.description.primitives import KINDS, Geometry
 from finger_pin.exceptions import InputError
 from finger_pin.mechanism.geometry import TendonGeometry
-from finger_pin.views.playground.session import Session
-from finger_pin.views.playground.stage import Stage
+from finger_pin.playground.session import Session
+from finger_pin.playground.stage import Stage
 from finger_pin.views.viewer.solids import link_solids
 from finger_pin.views.viewer.video import _Body
 

@@ -21,11 +21,11 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from finger_pin.exceptions import FingerPinError
+from finger_pin.playground.panel import PAUSE, PLAY, RESET, STEP, Panel
+from finger_pin.playground.session import Pacer, Session, save_pieces
+from finger_pin.playground.stage import Stage
 from finger_pin.simulation.simulator import Simulator
 from finger_pin.threads import wait_for
-from finger_pin.views.playground.panel import PAUSE, PLAY, RESET, STEP, Panel
-from finger_pin.views.playground.session import Pacer, Session, save_pieces
-from finger_pin.views.playground.stage import Stage
 from finger_pin.views.viewer.page_server import open_page
 
 # Height of the page in a notebook, pixels.
@@ -190,7 +190,7 @@ class Playground:
 def serve(
     session: Session, host: str, port: int, folder: Path, open_browser: bool | None, block: bool | None
 ) -> Playground:
-    """Play a session, as `finger_pin.views.playground.play` says."""
+    """Play a session, as `finger_pin.playground.play` says."""
     playground = Playground(session, host, port, folder)
     if open_page(playground.url, open_browser, block):
         if host not in ("127.0.0.1", "localhost"):

@@ -17,7 +17,7 @@ from finger_pin.exceptions import FingerPinError
 from finger_pin.version import installing
 
 if TYPE_CHECKING:
-    from finger_pin.views.playground.player import Playground
+    from finger_pin.playground.player import Playground
 
 __all__ = ["play"]
 
@@ -54,7 +54,7 @@ def play(
     """
     if find_spec("viser") is None:
         raise FingerPinError(f"the playground needs viser: {installing('play')}")
-    from finger_pin.views.playground.player import serve
-    from finger_pin.views.playground.session import Session
+    from finger_pin.playground.player import serve
+    from finger_pin.playground.session import Session
 
     return serve(Session(scenario, keys=keys, rtol=rtol), host, port, Path(folder), open_browser, block)

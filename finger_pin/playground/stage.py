@@ -12,8 +12,8 @@ import viser
 from finger_pin.control import PalmPath
 from finger_pin.description.primitives import Geometry
 from finger_pin.mechanism.geometry import LinkPoses
+from finger_pin.playground.session import Reading, Session
 from finger_pin.typing import Array
-from finger_pin.views.playground.session import Reading, Session
 from finger_pin.views.viewer.scene import Scene
 from finger_pin.views.viewer.scene_objects import SceneObjects
 from finger_pin.views.viewer.solids import (

@@ -16,10 +16,10 @@ from finger_pin.exceptions import InputError
 from finger_pin.mechanism.evaluation import ContactPoints
 from finger_pin.mechanism.finger import Finger
 from finger_pin.mechanism.signals import FingerSignals
+from finger_pin.playground.sliders import FINGER, Inputs, Slider, parameters
 from finger_pin.simulation.netcdf import save
 from finger_pin.simulation.simulator import Simulator
 from finger_pin.typing import Array
-from finger_pin.views.playground.sliders import FINGER, Inputs, Slider, parameters
 
 # Of what is not recorded this much is kept, s.
 _LOG_DURATION = 60.0

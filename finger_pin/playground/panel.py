@@ -12,11 +12,11 @@ import numpy as np
 import viser
 
 from finger_pin.exceptions import InputError
+from finger_pin.playground.charts import Charts
+from finger_pin.playground.session import Reading, Session
+from finger_pin.playground.sliders import SCENARIO, Slider
+from finger_pin.playground.stage import Stage
 from finger_pin.typing import Array
-from finger_pin.views.playground.charts import Charts
-from finger_pin.views.playground.session import Reading, Session
-from finger_pin.views.playground.sliders import SCENARIO, Slider
-from finger_pin.views.playground.stage import Stage
 
 _SPEEDS = {"real time": 1.0, "half": 0.5, "a quarter": 0.25, "a tenth": 0.1, "a hundredth": 0.01}
 PLAY, PAUSE, STEP, RESET = "Play", "Pause", "Step", "Reset"

@@ -8,8 +8,8 @@ import pytest
 
 import finger_pin as fp
 from finger_pin.control.closed_loop import ClosedLoop
-from finger_pin.views.playground.session import Pacer, Session, save_pieces
-from finger_pin.views.playground.sliders import JOINTS, SCENARIO, TENDONS
+from finger_pin.playground.session import Pacer, Session, save_pieces
+from finger_pin.playground.sliders import JOINTS, SCENARIO, TENDONS
 
 STIFFNESS, DAMPING, RADIUS = 0.05, 2e-3, 0.008
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from viser import uplot
 
+from finger_pin.playground.session import Reading, Session
+from finger_pin.playground.stage import Stage
 from finger_pin.typing import Array
-from finger_pin.views.playground.session import Reading, Session
-from finger_pin.views.playground.stage import Stage
 from finger_pin.views.viewer.solids import tension_colours
 
 # Of the plots: their length, s, and the time between samples, s.

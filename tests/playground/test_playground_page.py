@@ -20,9 +20,9 @@ msgspec, zstandard = pytest.importorskip("msgspec"), pytest.importorskip("zstand
 websockets = pytest.importorskip("websockets.sync.client")
 from websockets.exceptions import InvalidStatus  # noqa: E402
 
-from finger_pin.views.playground.player import own_page_only  # noqa: E402
-from finger_pin.views.playground.session import Session  # noqa: E402
-from finger_pin.views.playground.stage import Stage  # noqa: E402
+from finger_pin.playground.player import own_page_only  # noqa: E402
+from finger_pin.playground.session import Session  # noqa: E402
+from finger_pin.playground.stage import Stage  # noqa: E402
 
 
 @pytest.fixture(scope="module")
