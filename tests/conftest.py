@@ -88,8 +88,8 @@ def fig6_progress():
 
 @pytest.fixture(scope="session")
 def fig6_runs(fig6_progress):
-    """The first 0.03 s of reversals by every method at the default tolerances."""
-    scenarios = {each: {"simulation.duration": 0.03, "simulation.method": each} for each in METHODS}
+    """The first 0.015 s of reversals by every method at the default tolerances."""
+    scenarios = {each: {"simulation.duration": 0.015, "simulation.method": each} for each in METHODS}
     return {
         method: fp.simulate(fp.load_scenario("reversals", changed), progress=fig6_progress[method].append)
         for method, changed in scenarios.items()

@@ -16,7 +16,7 @@ HAND = """<mujoco><option gravity="0 0 0"/><worldbody>
       <geom type="capsule" size="0.01" fromto="0 0 0 0 0 0.1"/></body></body></worldbody>
   <tendon><fixed name="cord"><joint joint="curl" coef="-0.01"/></fixed></tendon>
   <actuator><position name="servo" joint="swing" kp="2" kv="0.1"/></actuator></mujoco>"""
-TIMES = np.linspace(0.0, 0.4, 41)
+TIMES = np.linspace(0.0, 0.2, 21)
 NAMES = ("cord", "servo")
 GOAL, PULL = 0.5 * np.sin(9.0 * TIMES), 4.0 + 2.0 * np.cos(7.0 * TIMES)
 
@@ -24,7 +24,7 @@ GOAL, PULL = 0.5 * np.sin(9.0 * TIMES), 4.0 + 2.0 * np.cos(7.0 * TIMES)
 def scenario(**controller):
     table = fp.from_mujoco(mujoco.MjModel.from_xml_string(HAND)).model_dump(exclude_none=True)
     table["tendons"] = {"cord": {"along": "cord"}}
-    simulation = {"duration": 0.4, "sample_rate": 100.0}
+    simulation = {"duration": 0.2, "sample_rate": 100.0}
     return read_scenario({"name": "hand", "finger": table, "controller": controller, "simulation": simulation})
 
 

@@ -127,7 +127,7 @@ def simulated(rubber):
     """The start of `reversals` with the law at two joints, by the compiled core and by scipy on the readable model."""
     found = {}
     for method in ("Rodas5P", "Radau"):
-        settings = {"duration": 0.03, "method": method, "rtol": 1e-8, "atol_scale": 1e-8, "sample_rate": 2000.0}
+        settings = {"duration": 0.01, "method": method, "rtol": 1e-8, "atol_scale": 1e-8, "sample_rate": 2000.0}
         scenario = fp.load_scenario("reversals", {f"simulation.{name}": value for name, value in settings.items()})
         found[method] = fp.simulate(scenario, finger=rubber)
     return found
@@ -153,7 +153,7 @@ def test_a_simulation_shows_its_signals_and_books_its_energy_and_its_loss(simula
 def test_both_integrators_give_the_motion_with_the_law_and_it_is_another_one(simulated):
     for name, little in (("joint_position", 1e-7), ("rubber_hysteresis", 1e-7)):
         assert float(abs(simulated["Rodas5P"][name] - simulated["Radau"][name]).max()) < little
-    bare = fp.simulate(fp.load_scenario("reversals", {"simulation.duration": 0.03, "simulation.sample_rate": 2000.0}))
+    bare = fp.simulate(fp.load_scenario("reversals", {"simulation.duration": 0.01, "simulation.sample_rate": 2000.0}))
     assert float(abs(simulated["Rodas5P"]["joint_position"] - bare["joint_position"]).max()) > 1e-3
 
 

@@ -111,7 +111,7 @@ def test_a_keyframe_of_one_tree_leaves_the_others_at_their_first():
 def test_a_tree_and_links_have_controllers_of_their_own():
     """Motors of the tree are driven in open loop, tendons of the links by the paper's controller."""
     controller = {"inputs": {"left": {"motor": {"offset": 0.5}}}}
-    scenario = scenario_of({"left": TREE, "right": "ub"}, controller=controller)
+    scenario = scenario_of({"left": TREE, "right": "ub"}, controller=controller, simulation={"duration": 0.005})
     assert {name: part.controller.kind for name, part in scenario.parts().items()} == {
         "left": "tensions",
         "right": "proportional",

@@ -24,7 +24,7 @@ def coupling(routing):
 def runs():
     names = ("paper", "all friction", "all friction, f5d 4 N, loop")
     return {
-        name: fp.simulate(fp.load_scenario("reversals", {**CASES[name], "simulation.duration": 5.0})) for name in names
+        name: fp.simulate(fp.load_scenario("reversals", {**CASES[name], "simulation.duration": 4.0})) for name in names
     }
 
 

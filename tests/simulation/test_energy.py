@@ -70,7 +70,7 @@ def test_the_account_of_the_hard_case_closes():
 def test_the_residual_shrinks_with_the_tolerance(method):
     residuals = []
     for rtol in (1e-4, 1e-6, 1e-8):
-        settings = {"duration": 0.02, "method": method, "rtol": rtol, "atol_scale": rtol}
+        settings = {"duration": 0.01, "method": method, "rtol": rtol, "atol_scale": rtol}
         result = fp.simulate(
             fp.load_scenario("reversals", {f"simulation.{key}": value for key, value in settings.items()})
         )
