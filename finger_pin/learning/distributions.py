@@ -9,6 +9,7 @@ from numbers import Real
 from typing import Any, Protocol
 
 import numpy as np
+from scipy.special import ndtr, ndtri
 
 from finger_pin.exceptions import InputError
 
@@ -56,7 +57,7 @@ class LogUniform:
 
 @dataclass(frozen=True)
 class Normal:
-    """Numbers of a normal distribution, drawn again if outside of ``low`` and ``high``."""
+    """Normal distribution, cut at ``low`` and ``high``."""
 
     mean: float
     deviation: float
@@ -74,10 +75,12 @@ class Normal:
 
     def draw(self, random: np.random.Generator) -> float:
         """Return one draw."""
-        while True:
-            value = float(random.normal(self.mean, self.deviation))
-            if self.low <= value <= self.high:
-                return value
+        if self.deviation == 0.0:
+            return self.mean
+        below, above = (float(ndtr((end - self.mean) / self.deviation)) for end in (self.low, self.high))
+        # However narrow the range is; at a share of 0 the number would be infinite.
+        value = self.mean + self.deviation * ndtri(random.uniform(max(below, 1e-300), above))
+        return float(min(max(value, self.low), self.high))
 
 
 @dataclass(frozen=True)

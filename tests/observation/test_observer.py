@@ -64,6 +64,22 @@ def test_bands_hold_what_fingers_with_other_numbers_do():
     assert (np.concatenate(halves).mean(axis=0) / 1.96 / rms(np.concatenate(errors)) < 4.0).all()
 
 
+def test_an_estimate_that_cannot_be_predicted_stays_and_says_why():
+    """A current of 1 MA drives the spool beyond every physical range within a period."""
+    observer = fp.observe("wound")
+    observer.start()
+    readings = {"motor_current.servo": 0.0, "motor_position.servo": 0.0}
+    for _ in range(3):
+        before = observer.step(readings)
+    failed = observer.step({"motor_current.servo": 1e6, "motor_position.servo": np.nan})
+    assert "motor_velocity[servo]" in failed.failure and not before.failure
+    assert np.array_equal(failed.joint_position.value, before.joint_position.value)
+    assert (failed.joint_position.high >= before.joint_position.high).all()
+    assert failed.time == pytest.approx(before.time + observer.period)
+    # The jump of the current is of this period and the next.
+    assert [bool(observer.step(readings).failure) for _ in range(2)] == [True, False]
+
+
 def test_a_force_at_the_tip_is_seen_soon_and_gone_soon():
     truth = fp.simulate(
         fp.load_scenario("wound", {"simulation.duration": 2.5, "environment.fingertip_force_signal.y": TOUCHED})
