@@ -22,7 +22,7 @@ from websockets.exceptions import InvalidStatus  # noqa: E402
 
 from finger_pin.playground.player import own_page_only  # noqa: E402
 from finger_pin.playground.session import Session  # noqa: E402
-from finger_pin.playground.stage import Stage  # noqa: E402
+from finger_pin.playground.stage import ROOT, Stage  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -162,3 +162,23 @@ def test_an_ellipsoid_is_drawn_with_its_radii_and_turned_as_it_is():
     # A ball of the library's radius of 1 m, stretched; a quarter turn about z is cos 45 deg + k sin 45 deg.
     np.testing.assert_allclose(drawn["scale"], [0.01, 0.02, 0.03])
     np.testing.assert_allclose(drawn["wxyz"], np.sqrt([0.5, 0.0, 0.0, 0.5]), atol=1e-12)
+
+
+def test_the_page_has_objects_and_contacts_where_the_simulator_has_them():
+    server, session, frames = MagicMock(), Session("pinch"), {}
+    server.scene.add_frame.side_effect = lambda path, **_: frames.setdefault(path, MagicMock())
+    stage = Stage(server, session)
+    while not (touching := session.signals().mechanism.touching).force.any():
+        session.step()
+    stage.show(session.reading())
+    ball, pose = frames[f"{ROOT}/object_ball"], session.simulator.state.object_pose
+    np.testing.assert_array_equal(ball.position, pose[:3])
+    # viser has the real part of a quaternion first.
+    np.testing.assert_array_equal(ball.wxyz, pose[[6, 3, 4, 5]])
+    closed = touching.force.any(axis=-1)
+    arrows = server.scene.add_arrows.return_value.points
+    np.testing.assert_allclose(arrows[:, 0], touching.point[closed], atol=1e-7)
+    assert arrows.shape == (closed.sum(), 2, 3)
+    drawn = arrows[:, 1] - arrows[:, 0]
+    lengths = np.linalg.norm(drawn, axis=1) * np.linalg.norm(touching.force[closed], axis=1)
+    np.testing.assert_allclose(np.sum(drawn * touching.force[closed], axis=1), lengths, rtol=1e-3)
