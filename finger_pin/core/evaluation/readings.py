@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from finger_pin.core.evaluation.blocks import add_contact_gain, factorise, substitute
 from finger_pin.core.jit import Vector, njit_always_inline, njit_inline
 from finger_pin.core.tables.linear_systems import Linear
@@ -23,7 +21,10 @@ def resolve_readings(structure: Structure, linear: Linear, b: int, width: int, w
     """Solve for the changes of the states that rows of a block read, and put them into its gains; false if singular."""
     blocks, matrix, solved, reads = linear.blocks, linear.read_matrix, linear.read_gain, structure.read_states.size
     states, first = blocks.states[blocks.state_start[b] : blocks.state_start[b + 1]], linear.contact_state_gain.shape[0]
-    matrix[:, :] = np.eye(reads)
+    # An array in place of numbers would take seconds to compile, for the text of an error that there cannot be.
+    matrix[:, :] = 0.0
+    for p in range(reads):
+        matrix[p, p] = 1.0
     solved[:wide] = 0.0
     for s in states:
         p = structure.read_place[s]
