@@ -121,7 +121,7 @@ def _push(structure: Structure, linear: Linear, k: int, full: int, row: Vector) 
         _add_scaled(linear.force[linear.blocks.place[structure.arm_at[e]]], linear.arm[e], row, full)
 
 
-@njit_always_inline
+@njit_inline
 def _gains(model: Model, address: int, g: float, b: int, width: int, wide: int) -> bool:
     """Fill the gains of a block's rows and states, and sum up A^T d phi; false if states that are read are singular."""
     structure, parameters = model.structure, model.parameters

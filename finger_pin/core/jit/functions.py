@@ -55,6 +55,8 @@ def njit_always_inline(function: _Function) -> _Function:
 
     Numba optimises each function of `njit_inline` with all that it calls, and makes machine code of it, though only
     what calls it is ever run: of a chain of calls, the last function would be optimised as often as the chain is long.
+    What is inlined here it copies twice for each caller in the chain, block by block with all names of the function: of
+    one with 150 blocks and 1,500 names that takes longer than to optimise it.
     """
     return numba.njit(inline="always", **_OPTIONS)(function)  # type: ignore[no-any-return]
 
