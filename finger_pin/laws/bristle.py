@@ -66,9 +66,7 @@ def friction_coefficient(
         side: As in `Row`.
     """
     ratio = magnitude(velocity, side) / stribeck
-    # ratio**exponent, exact for 1 and 2, without the cost of a power.
-    power = ratio * ((2.0 - exponent) + (exponent - 1.0) * ratio)
-    return kinetic + (static - kinetic) * np.exp(-np.maximum(power, _LEAST_POWER))
+    return kinetic + (static - kinetic) * np.exp(-_stribeck_power(ratio, exponent))
 
 
 def friction_coefficient_slope(
@@ -76,10 +74,14 @@ def friction_coefficient_slope(
 ) -> Number:
     """Return dM/dv of (9b)."""
     ratio = magnitude(velocity, side) / stribeck
-    power = ratio * ((2.0 - exponent) + (exponent - 1.0) * ratio)
+    power = _stribeck_power(ratio, exponent)
     power_slope = ((2.0 - exponent) + 2.0 * (exponent - 1.0) * ratio) * (power > _LEAST_POWER)
-    fallen = np.exp(-np.maximum(power, _LEAST_POWER))
-    return -direction(velocity, side) * (static - kinetic) / stribeck * power_slope * fallen
+    return -direction(velocity, side) * (static - kinetic) / stribeck * power_slope * np.exp(-power)
+
+
+def _stribeck_power(ratio: Numeric, exponent: Number) -> Numeric:
+    """Return (|v| / omega)^p of (9b), not below `_LEAST_POWER`; exact for 1 and 2, without the cost of a power."""
+    return np.maximum(ratio * ((2.0 - exponent) + (exponent - 1.0) * ratio), _LEAST_POWER)
 
 
 def friction_level(normal: Number, coefficient: Number, floor: Number, drag: Number = 0.0) -> Number:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from finger_pin.description.finger_description import FingerDescription
 from finger_pin.description.objects import Object
 from finger_pin.mechanism.object_scene import Scene
+from finger_pin.mechanism.rows import Rows
 
 # Entries of an object and of a palm that change masses and motions alone.
 _OF_OBJECT, _OF_PALM = {"mass", "path"}, {"path"}
@@ -24,7 +25,8 @@ def with_changed_parameters(
     the palm.
     """
     args, old = finger.constructor_args, finger.description
-    parts = {name: replace(part, description=description) for name, part in vars(finger).items() if _has_entry(part)}
+    own = {name: part for name, part in vars(finger).items() if hasattr(part, "ENTRY")}
+    parts = {name: replace(part, description=description) for name, part in own.items()}
     entries = {part.ENTRY for part in parts.values()}
     if args.tables or (objects is None) != (args.objects is None) or not _same_wiring(entries, old, description):
         return None
@@ -36,12 +38,16 @@ def with_changed_parameters(
     # Signals stay, which copies leave out.
     twin.__dict__ |= vars(finger) | parts
     twin.description, twin.constructor_args, twin.scene = description, args._replace(objects=objects), scene
-    changed = {
-        name: part for name, part in parts.items() if getattr(old, part.ENTRY) is not getattr(description, part.ENTRY)
-    }
+    stale = {name for name, part in parts.items() if getattr(old, part.ENTRY) is not getattr(description, part.ENTRY)}
     before, twin.mechanism = finger.mechanism, copy.copy(finger.mechanism)
-    twin.mechanism.listed = tuple(each.of_parts(changed) for each in before.listed)
-    twin.extra_rows = tuple(each.of_parts(changed) for each in finger.extra_rows)
+    # Some stand among both, with more coordinates where there are objects, and share their source.
+    sources = {each.source for each in (*before.listed, *finger.extra_rows) if each.source}
+    numbers = {each: each.numbers(parts[each.part]) for each in sources if each.part in stale}
+
+    def changed(tables: Sequence[Rows]) -> tuple[Rows, ...]:
+        return tuple([each.with_parameters(numbers.get(each.source)) for each in tables])
+
+    twin.mechanism.listed, twin.extra_rows = changed(before.listed), changed(finger.extra_rows)
     by_group = {table.group: table for table in twin.mechanism.listed}
     twin.mechanism.rows = tuple([by_group[table.group] for table in before.rows])
     if scene is not None:
@@ -64,10 +70,6 @@ def _scene(finger: Any, description: FingerDescription, objects: Mapping[str, Ob
     return scene.with_masses(around, finger.rigid_body, after if finger.mechanism.moved else None)
 
 
-def _has_entry(part: Any) -> bool:
-    return hasattr(part, "ENTRY")
-
-
 def _same_wiring(entries: Collection[str], first: FingerDescription, second: FingerDescription) -> bool:
     """Return whether two descriptions differ in numbers of some entries and in the path of a palm alone."""
     if first is second:
@@ -76,13 +78,13 @@ def _same_wiring(entries: Collection[str], first: FingerDescription, second: Fin
     same = _same_but(entries, first, second) and _choices(entries, first) == _choices(entries, second)
     if not same or one is None or other is None:
         return same and one is other
-    fingers = [each.finger for each in one.fingers.values()], [each.finger for each in other.fingers.values()]
+    pairs = list(zip(one.fingers.values(), other.fingers.values(), strict=False))
     return (
         _same_but({"fingers", "palm"}, one, other)
         and _same_but(_OF_PALM, one.palm, other.palm)
         and [*one.fingers] == [*other.fingers]
-        and all(_same_but({"finger"}, *pair) for pair in zip(one.fingers.values(), other.fingers.values(), strict=True))
-        and all(_same_wiring(entries, *pair) for pair in zip(*fingers, strict=True))
+        and all(_same_but({"finger"}, *pair) for pair in pairs)
+        and all(_same_wiring(entries, first.finger, second.finger) for first, second in pairs)
     )
 
 

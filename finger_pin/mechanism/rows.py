@@ -215,11 +215,11 @@ class Rows:
 
         return replace(self, arm=wide(self.arm), measure=wide(self.measure), bends=wide(self.bends))
 
-    def of_parts(self, parts: Mapping[str, Any]) -> Rows:
-        """Return the same rows with their numbers of other parts of the finger; itself where they come of none."""
-        if self.source is None or self.source.part not in parts:
+    def with_parameters(self, parameters: Array | None) -> Rows:
+        """Return the same rows with other first parameters of the law, shape (at most all, k); itself without any."""
+        if parameters is None:
             return self
-        parameters, rows = self.source.numbers(parts[self.source.part]), object.__new__(Rows)
+        rows = object.__new__(Rows)
         vars(rows).update(vars(self), parameters=np.vstack([parameters, self.parameters[len(parameters) :]]))
         return rows
 
